@@ -60,6 +60,7 @@ mod model_folders;
 mod models;
 mod more_scenes;
 mod move_to;
+mod names;
 mod new_project;
 mod new_things;
 mod no_panic;

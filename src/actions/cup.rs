@@ -11,6 +11,7 @@ use crate::grasp::{Approach, Grasp, hand, is_round};
 use crate::grip::feels;
 use crate::operator::{Interrupt, Operator};
 use crate::pick::failed;
+use crate::pick_fault::PickFault;
 use crate::place::{Touch, straight};
 use actcheck_data::{ActionReport, Pose, Suction};
 use actcheck_world::Sighting;
@@ -48,8 +49,8 @@ const BESIDE_SHARE: f64 = 0.5;
 /// that is not round.
 ///
 /// # Errors
-/// A sentence for the action's report if the object is too small for the cup.
-pub fn grasps(thing: &Sighting, cup: &Suction) -> Result<Vec<Grasp>, String> {
+/// [`PickFault::TooSmall`] if the object is too small for the cup.
+pub fn grasps(thing: &Sighting, cup: &Suction) -> Result<Vec<Grasp>, PickFault> {
     let (across, [width, depth, height]) = (2.0 * cup.radius_m, thing.size_m);
     let mut found = Vec::new();
     if width.min(depth) >= across {
@@ -69,10 +70,11 @@ pub fn grasps(thing: &Sighting, cup: &Suction) -> Result<Vec<Grasp>, String> {
     }
     if found.is_empty() {
         let [narrow_cm, cup_cm] = [width.min(depth), across].map(|size| size * 100.0);
-        return Err(format!(
-            "{} is too small for the suction cup: its top is {narrow_cm:.1} cm across, the cup {cup_cm:.1} cm",
-            thing.id
-        ));
+        return Err(PickFault::TooSmall {
+            id: thing.id.clone(),
+            narrow_cm,
+            cup_cm,
+        });
     }
     Ok(found)
 }
@@ -270,7 +272,7 @@ mod tests {
     fn an_object_smaller_than_the_cup_is_refused_with_both_sizes() {
         let refused = grasps(&thing([0.03, 0.03, 0.2]), &CUP).expect_err("it is narrow");
         assert_eq!(
-            refused,
+            refused.to_string(),
             "t is too small for the suction cup: its top is 3.0 cm across, the cup 4.0 cm"
         );
         let sides = grasps(&thing([0.03, 0.3, 0.2]), &CUP).expect("two of its sides are wide");

@@ -91,7 +91,7 @@ impl<'w> Forced<'w> {
         ik::solve(
             self.world.kinematics(),
             seed,
-            &ik::Reach { target, mobility },
+            &ik::IkRequest { target, mobility },
         )
     }
 }

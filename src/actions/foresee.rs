@@ -10,6 +10,7 @@ use crate::memory::Memory;
 use crate::operator::Operator;
 use crate::perceive::towards;
 use crate::pick::planned;
+use crate::pick_fault::PickFault;
 use crate::rim;
 use actcheck_data::{Choices, Rim};
 use actcheck_world::{GRAVITY, World};
@@ -52,12 +53,12 @@ pub fn takes_rim(rim: &Rim, max_opening_m: f64) -> bool {
 /// of a run.
 ///
 /// # Errors
-/// The reason for which the skill would fail.
+/// The reason why the skill would fail.
 pub fn foresee_pick(
     target: &str,
     world: &mut World,
     choices: &mut Choices,
-) -> Result<ForeseenPick, String> {
+) -> Result<ForeseenPick, PickFault> {
     world.localise(choices);
     let mut memory = Memory::default();
     let mut robot = Operator::new(
@@ -69,7 +70,7 @@ pub fn foresee_pick(
     );
     let seen = robot
         .see(target)
-        .ok_or_else(|| format!("{target} was not seen"))?;
+        .ok_or_else(|| PickFault::NotSeen(target.to_owned()))?;
     let others = robot.see_others(target);
     let plan = planned(&seen, &others, &mut robot)?;
     let posture = plan

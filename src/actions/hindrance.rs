@@ -3,6 +3,8 @@
 //!
 //! Never: plans, or decides how much clearance is needed.
 
+use std::fmt;
+
 use nalgebra::{Isometry3, Point3};
 
 use crate::link_points::LinkPoints;
@@ -51,6 +53,25 @@ impl Hindrance {
     }
 }
 
+/// No grasp has a plan: a sentence for the action's report.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NoPlan {
+    /// A clause about the grasp that came nearest to a plan, if one says something about the
+    /// object.
+    pub why: Option<String>,
+}
+
+impl fmt::Display for NoPlan {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.why {
+            None => out.write_str(NO_WAY),
+            Some(why) => write!(out, "{NO_WAY}: {why}"),
+        }
+    }
+}
+
+impl std::error::Error for NoPlan {}
+
 /// The hindrance of the grasp that came nearest to a plan.
 #[derive(Debug, Default)]
 pub struct Nearest(Option<Hindrance>);
@@ -76,9 +97,9 @@ impl Nearest {
     }
 
     /// The reason for the action's report.
-    pub fn reason(&self, thing: Option<&Sighting>, around: &Surroundings<'_>) -> String {
+    pub fn reason(&self, thing: Option<&Sighting>, around: &Surroundings<'_>) -> NoPlan {
         let why = match &self.0 {
-            None | Some(Hindrance::Dearer | Hindrance::Touches) => return NO_WAY.to_owned(),
+            None | Some(Hindrance::Dearer | Hindrance::Touches) => return NoPlan { why: None },
             Some(Hindrance::OutOfReach) => out_of_reach(thing, around.furniture),
             Some(Hindrance::NoLift) => {
                 "the arm reaches it but can't lift it straight up".to_owned()
@@ -101,7 +122,7 @@ impl Nearest {
             }
             Some(Hindrance::Blocked { posture, .. }) => around.in_the_way(posture),
         };
-        format!("{NO_WAY}: {why}")
+        NoPlan { why: Some(why) }
     }
 }
 

@@ -24,6 +24,7 @@ mod pace;
 mod perceive;
 mod perform;
 mod pick;
+mod pick_fault;
 mod place;
 mod plan;
 mod plan_cost;
@@ -44,8 +45,10 @@ pub use foresee::{
     ForeseenPick, ForeseenView, foresee_pick, foresee_view, needed_opening_m, takes_rim,
 };
 pub use grip::feels_in;
+pub use hindrance::NoPlan;
 pub use memory::Held;
 pub use operator::{Interrupt, Operator};
 pub use perform::{Gate, Interference, perform, perform_with};
+pub use pick_fault::PickFault;
 pub use sabotage::{Accident, Defect, Moment, Sabotage, Saboteur};
 pub use skills::{UnknownSkill, known_skill};

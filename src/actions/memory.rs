@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Isometry3, Vector3};
 
 use crate::grip::EMPTY_M;
+use crate::pick_fault::PickFault;
 use actcheck_data::{KnownKind, Perceived, PerceivedPlane, PerceivedThing, Pose};
 use actcheck_world::Sighting;
 
@@ -70,13 +71,13 @@ const DISTANCE_SHARE: f64 = 0.02;
 /// the one nearest to `from`. Frame: world, by the base's belief.
 ///
 /// # Errors
-/// If nothing of that kind was perceived, a sentence for the action's report.
+/// [`PickFault::NoMatch`] if no percept is of that kind.
 pub fn recall(
     perceived: &Perceived,
     id: &str,
     kind: &KnownKind,
     from: &Vector3<f64>,
-) -> Result<(Sighting, Vec<Sighting>), String> {
+) -> Result<(Sighting, Vec<Sighting>), PickFault> {
     let of_kind = |thing: &&PerceivedThing| thing.category.as_ref() == Some(&kind.category);
     let miss = |thing: &PerceivedThing| {
         let off: f64 = thing
@@ -94,7 +95,7 @@ pub fn recall(
         .filter(|(_, thing)| of_kind(thing));
     let (chosen, target) = things
         .min_by(|(_, a), (_, b)| miss(a).total_cmp(&miss(b)))
-        .ok_or_else(|| format!("no perceived object matches {id}"))?;
+        .ok_or_else(|| PickFault::NoMatch(id.to_owned()))?;
     let others = perceived
         .things
         .iter()
@@ -189,7 +190,7 @@ mod tests {
         }
     }
 
-    fn recalled(things: Vec<PerceivedThing>) -> Result<(Sighting, Vec<Sighting>), String> {
+    fn recalled(things: Vec<PerceivedThing>) -> Result<(Sighting, Vec<Sighting>), PickFault> {
         let plane = PerceivedPlane {
             pose: Pose::upright([1.0, 0.0, 0.7], 0.3),
             size_m: [0.6, 0.5],
@@ -297,7 +298,7 @@ mod tests {
     fn an_unperceived_object_cannot_be_grasped() {
         assert_eq!(
             recalled(vec![thing(None, 0.5, 0.146)]),
-            Err("no perceived object matches glass_1".to_owned())
+            Err(PickFault::NoMatch("glass_1".to_owned()))
         );
     }
 }

@@ -63,7 +63,7 @@ impl Course {
         if by_speed <= 0.0 {
             return by_speed;
         }
-        let moments: Vec<Moment> = (0..=N_MOMENTS)
+        let moments: Vec<MotionSample> = (0..=N_MOMENTS)
             .map(|idx| self.moment(kinematics, by_speed, share_of(idx)))
             .collect();
         let mut secs = by_speed;
@@ -89,7 +89,7 @@ impl Course {
     }
 
     /// The dynamics of the robot at a share of a motion that takes `secs`.
-    fn moment(&self, kinematics: &Kinematics, secs: f64, share: f64) -> Moment {
+    fn moment(&self, kinematics: &Kinematics, secs: f64, share: f64) -> MotionSample {
         let (time, step) = (share * secs, secs / 1e3);
         let (before, after) = (self.at(time - step, secs), self.at(time + step, secs));
         let velocities: Vec<f64> = after
@@ -97,7 +97,7 @@ impl Course {
             .zip(&before)
             .map(|(a, b)| (a - b) / (2.0 * step))
             .collect();
-        Moment {
+        MotionSample {
             share,
             dynamics: kinematics.dynamics(&self.at(time, secs), &velocities),
         }
@@ -109,7 +109,7 @@ impl Course {
     fn needed(
         &self,
         kinematics: &Kinematics,
-        moments: &[Moment],
+        moments: &[MotionSample],
         joints: &[usize],
         (secs, known_secs): (f64, f64),
         tick_secs: f64,
@@ -117,7 +117,7 @@ impl Course {
         let window = self.window_secs(kinematics, joints, secs).max(tick_secs);
         let slower = (known_secs / secs) * (known_secs / secs);
         let mut most = 0.0_f64;
-        for Moment { share, dynamics } in moments {
+        for MotionSample { share, dynamics } in moments {
             let time = share * secs;
             let [before, now, after] =
                 [time - window, time, time + window].map(|time| self.at(time, secs));
@@ -157,7 +157,7 @@ impl Course {
 }
 
 /// A moment of a motion.
-struct Moment {
+struct MotionSample {
     /// Share of the motion's time.
     share: f64,
     dynamics: Dynamics,

@@ -5,6 +5,7 @@ use crate::grip::{close, feels};
 use crate::memory::Held;
 use crate::operator::{Interrupt, Operator};
 use crate::perceive::look_again;
+use crate::pick_fault::PickFault;
 use crate::plan::{self, Plan, PlanRequest};
 use crate::{ActionCall, cup, grasp, memory, rim};
 use actcheck_data::{ActionReport, Pose, Rim};
@@ -39,11 +40,11 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
             },
             others,
         ),
-        Err(reason) => return Ok(failed(reason)),
+        Err(fault) => return Ok(failed(fault.to_string())),
     };
     let way = match planned(&seen, &others, robot) {
         Ok(way) => way,
-        Err(reason) => return Ok(failed(reason)),
+        Err(fault) => return Ok(failed(fault.to_string())),
     };
     robot.begin("drive");
     robot.follow(&way.drive, 0.0)?;
@@ -88,12 +89,16 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
 /// Plans how to pick an object among others.
 ///
 /// # Errors
-/// The reason for the action's report if it can't be picked.
+/// [`PickFault`] if it can't be picked.
 pub(super) fn planned(
     seen: &Sighting,
     others: &[Sighting],
     robot: &mut Operator<'_>,
-) -> Result<Plan, String> {
+) -> Result<Plan, PickFault> {
+    let no_plan = |why| PickFault::NoPlan {
+        id: seen.id.clone(),
+        why,
+    };
     if let Some(suction) = robot.profile().suction {
         let all = cup::grasps(seen, &suction)?;
         let (tops, sides): (Vec<_>, Vec<_>) = all
@@ -106,8 +111,7 @@ pub(super) fn planned(
             all: &all,
             taken: Some(seen),
         };
-        return plan::plan(robot, wanted, others)
-            .map_err(|reason| format!("{}: {reason}", seen.id));
+        return plan::plan(robot, wanted, others).map_err(no_plan);
     }
     let max_opening_m = grasp::opening_before_m(seen, robot);
     let (grasps, all) = (
@@ -126,14 +130,14 @@ pub(super) fn planned(
         None => (grasps, all),
     };
     if grasps.is_empty() {
-        return Err(format!("{} is too wide for the gripper", seen.id));
+        return Err(PickFault::TooWide(seen.id.clone()));
     }
     let wanted = PlanRequest {
         grasps: &grasps,
         all: &all,
         taken: Some(seen),
     };
-    plan::plan(robot, wanted, others).map_err(|reason| format!("{}: {reason}", seen.id))
+    plan::plan(robot, wanted, others).map_err(no_plan)
 }
 
 /// The rim of an upright vessel that is too wide for the hand, as the robot knows its kind.
@@ -153,11 +157,11 @@ fn rim_of(seen: &Sighting, robot: &Operator<'_>) -> Option<Rim> {
 
 /// The target and all other objects: as perceived by an earlier action of the run, otherwise from
 /// the abstract detector.
-fn find(target: &str, robot: &mut Operator<'_>) -> Result<(Sighting, Vec<Sighting>), String> {
+fn find(target: &str, robot: &mut Operator<'_>) -> Result<(Sighting, Vec<Sighting>), PickFault> {
     if let Some(perceived) = &robot.memory().perceived {
         let kind = robot
             .kind_of(target)
-            .ok_or_else(|| format!("{target} has no known kind"))?;
+            .ok_or_else(|| PickFault::UnknownKind(target.to_owned()))?;
         let (seen, mut others) =
             memory::recall(perceived, target, &kind, &robot.base().translation.vector)?;
         others.extend(memory::elsewhere(robot.known_furniture(), perceived));
@@ -167,7 +171,7 @@ fn find(target: &str, robot: &mut Operator<'_>) -> Result<(Sighting, Vec<Sightin
     }
     let seen = robot
         .see(target)
-        .ok_or_else(|| format!("{target} was not seen"))?;
+        .ok_or_else(|| PickFault::NotSeen(target.to_owned()))?;
     let others = robot.see_others(target);
     Ok((seen, others))
 }

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
 use crate::grasp::{Approach, Grasp, rolled};
-use crate::hindrance::{Hindrance, Nearest, Surroundings};
+use crate::hindrance::{Hindrance, Nearest, NoPlan, Surroundings};
 use crate::link_points::LinkPoints;
 use crate::motion::{Samples, moved_links};
 use crate::operator::Operator;
@@ -88,12 +88,12 @@ pub struct PlanRequest<'a> {
 /// many slants, and last those turned relative to the base. For a fixed base, see [`standing`].
 ///
 /// # Errors
-/// If there is no plan, the reason as a sentence for the action's report.
+/// [`NoPlan`] if there is no plan.
 pub fn plan(
     operator: &mut Operator<'_>,
     wanted: PlanRequest<'_>,
     others: &[Sighting],
-) -> Result<Plan, String> {
+) -> Result<Plan, NoPlan> {
     let Some(base) = operator.layout().base else {
         return standing::plan(operator, wanted, others);
     };
@@ -411,7 +411,7 @@ impl<'a> Planner<'a> {
         ik::solve(
             self.kinematics,
             seed,
-            &ik::Reach {
+            &ik::IkRequest {
                 target: *target,
                 mobility,
             },

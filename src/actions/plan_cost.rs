@@ -1,7 +1,7 @@
 //! The cost of a mobile robot's plan, and arm paths around obstacles.
 
 use crate::hindrance::Hindrance;
-use crate::motion::{self, ArmSpace, Room, Samples};
+use crate::motion::{self, ArmClearance, ArmSpace, Samples};
 use crate::plan::{
     AMPLE_BODY_CLEAR_M, AMPLE_CLEAR_M, BODY_CLEAR_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, Plan,
     Planner,
@@ -107,7 +107,7 @@ impl Planner<'_> {
             std::slice::from_ref(&self.start),
         );
         let space = space.farther(BODY_CLEAR_M - FURNITURE_CLEAR_M);
-        let least = Room {
+        let least = ArmClearance {
             furniture_m: FURNITURE_CLEAR_M,
             things_m: LEAST_CLEAR_M,
         };
@@ -129,8 +129,8 @@ impl Planner<'_> {
     ///
     /// # Errors
     /// [`Hindrance::Blocked`] with the first posture that is not free.
-    fn clearance(&self, from: &[f64], to: &[f64]) -> Result<Nearest, Hindrance> {
-        let mut nearest = Nearest::AMPLE;
+    fn clearance(&self, from: &[f64], to: &[f64]) -> Result<PathClearance, Hindrance> {
+        let mut nearest = PathClearance::AMPLE;
         for step in 0..=N_CHECKS {
             let share = step as f64 / N_CHECKS as f64;
             let positions: Vec<f64> = from
@@ -167,7 +167,7 @@ impl Planner<'_> {
 }
 
 /// Smallest distances on a path. Unit: metres; negative inside.
-struct Nearest {
+struct PathClearance {
     /// Of the hand to furniture.
     hand_m: f64,
     /// Of the other links to furniture.
@@ -176,7 +176,7 @@ struct Nearest {
     things_m: f64,
 }
 
-impl Nearest {
+impl PathClearance {
     /// Distances beyond which more brings no benefit.
     const AMPLE: Self = Self {
         hand_m: FURNITURE_CLEAR_M,

@@ -29,7 +29,7 @@ const PLACES: [(f64, f64); 5] = [
 ];
 
 /// How a hand with this opening fits on a rim.
-struct Fit {
+struct RimFit {
     /// Height of the fingertips.
     tip_m: f64,
     /// Distance of the middle between the fingers from the axis of the vessel.
@@ -38,7 +38,7 @@ struct Fit {
 }
 
 /// Returns `None` if a finger does not fit inside.
-fn fit(rim: &Rim, max_opening_m: f64) -> Option<Fit> {
+fn fit(rim: &Rim, max_opening_m: f64) -> Option<RimFit> {
     let tip_m = (rim.floor_m + ABOVE_FLOOR_M).max(rim.top_m - DEEPEST_M);
     let inner_at = |height: f64| rim.radius_m - rim.slope * (rim.top_m - height) - rim.wall_m;
     // A slanted wall touches the inner finger at its tip, and the outer one at the upper end.
@@ -48,7 +48,7 @@ fn fit(rim: &Rim, max_opening_m: f64) -> Option<Fit> {
     // opposite.
     let opening_m = max_opening_m.min(2.0 * (middle_m + inside - FINGER_M - ROOM_M));
     let fits = tip_m <= rim.top_m - REACH_M / 2.0 && opening_m >= outside - inside + 2.0 * ROOM_M;
-    fits.then_some(Fit {
+    fits.then_some(RimFit {
         tip_m,
         middle_m,
         opening_m,
@@ -64,7 +64,7 @@ pub(crate) fn opening_m(rim: &Rim, max_opening_m: f64) -> Option<f64> {
 /// All grasps of a vessel at its rim, with the hand pointing straight down. Empty if a finger does
 /// not fit inside.
 pub(crate) fn grasps(thing: &Sighting, rim: &Rim, max_opening_m: f64) -> Vec<Grasp> {
-    let Some(Fit {
+    let Some(RimFit {
         tip_m,
         middle_m,
         opening_m,

@@ -140,7 +140,7 @@ impl Ground {
             pillars,
             radius,
         };
-        let lack = (-ground.room(from)).clamp(0.0, radius);
+        let lack = (-ground.clearance(from)).clamp(0.0, radius);
         // Keeps a rounding error from shutting the base in.
         ground.radius -= if lack > 0.0 { lack + GRAIN_M } else { 0.0 };
         let out = ground.radius + ROOM_M + CORNER_M;
@@ -150,7 +150,7 @@ impl Ground {
             .collect();
         ground.corners.retain({
             let ground = ground.clone();
-            move |corner| ground.room(corner) >= 0.0
+            move |corner| ground.clearance(corner) >= 0.0
         });
         ground
     }
@@ -201,11 +201,12 @@ impl Ground {
             reason = "a few metres of centimetres"
         )]
         let n_steps = (length(way.x, way.y) / CHECK_M).ceil().clamp(1.0, 1e3) as usize;
-        (0..=n_steps).all(|step| self.room(&(from + way * (step as f64 / n_steps as f64))) >= 0.0)
+        (0..=n_steps)
+            .all(|step| self.clearance(&(from + way * (step as f64 / n_steps as f64))) >= 0.0)
     }
 
     /// Clearance to spare around a base at this position. Unit: metres.
-    fn room(&self, at: &Point2<f64>) -> f64 {
+    fn clearance(&self, at: &Point2<f64>) -> f64 {
         let point = Point3::new(at.x, at.y, 0.0);
         let blocks = self.blocks.iter().map(|block| block.beside(&point));
         let pillars = self

@@ -3,8 +3,8 @@
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 
 use crate::grasp::{Approach, Grasp, rolled};
-use crate::hindrance::{Hindrance, Nearest};
-use crate::motion::{self, ArmSpace, Room, Samples};
+use crate::hindrance::{Hindrance, Nearest, NoPlan};
+use crate::motion::{self, ArmClearance, ArmSpace, Samples};
 use crate::operator::Operator;
 use crate::plan::{
     AMPLE_CLEAR_M, APPROACH_M, FURNITURE_CLEAR_M, LEAST_CLEAR_M, LIFTS_M, Plan, PlanRequest,
@@ -50,7 +50,7 @@ const SHORT_APPROACH_M: f64 = 0.08;
 /// Unit: metres.
 const ASIDE_M: [f64; 5] = [0.0, 0.006, -0.006, 0.012, -0.012];
 /// Clearances at the object and on the way from it.
-const LEAST_ROOM: Room = Room {
+const LEAST_CLEARANCE: ArmClearance = ArmClearance {
     furniture_m: FURNITURE_CLEAR_M,
     things_m: LEAST_CLEAR_M,
 };
@@ -61,12 +61,12 @@ const RETREATS_M: [f64; 2] = [0.1, 0.05];
 /// then among hands at many slants.
 ///
 /// # Errors
-/// If there is no plan, the reason as a sentence for the action's report.
+/// [`NoPlan`] if there is no plan.
 pub fn plan(
     operator: &mut Operator<'_>,
     wanted: PlanRequest<'_>,
     others: &[Sighting],
-) -> Result<Plan, String> {
+) -> Result<Plan, NoPlan> {
     let mut samples = match wanted.taken {
         Some(_) => Samples::new(operator.choose_samples(), MOST_SAMPLES),
         None => Samples::new(0.0, 0),
@@ -255,7 +255,7 @@ impl<'a> Arm<'a> {
             .gripper
             .set(&mut opened, operator.profile().max_opening_m);
         let mut before = space(std::slice::from_ref(&start));
-        if !before.room(&opened).1 {
+        if !before.clearance(&opened).1 {
             // Fingers that turn wide open come close to the wrist, wherever the arm is.
             before = space(&[start.clone(), opened]);
         }
@@ -361,15 +361,15 @@ impl<'a> Arm<'a> {
         let legs = [approach.as_slice(), closing.as_slice(), lift.as_slice()].concat();
         let mut nearest = f64::INFINITY;
         for posture in legs {
-            let (room, clear_of_itself) = self.meanwhile.room(&posture);
+            let (room, clear_of_itself) = self.meanwhile.clearance(&posture);
             if !clear_of_itself {
                 return Err(Hindrance::Itself {
                     links: self.meanwhile.touching(&posture),
                 });
             }
-            let lack_m = (LEAST_ROOM.furniture_m - room.furniture_m)
-                .max(LEAST_ROOM.things_m - room.things_m);
-            if !room.holds(LEAST_ROOM) {
+            let lack_m = (LEAST_CLEARANCE.furniture_m - room.furniture_m)
+                .max(LEAST_CLEARANCE.things_m - room.things_m);
+            if !room.holds(LEAST_CLEARANCE) {
                 return Err(Hindrance::Blocked { posture, lack_m });
             }
             nearest = nearest.min(room.things_m);
@@ -408,7 +408,7 @@ impl<'a> Arm<'a> {
     fn retreat(&self, lifted: &[f64], back: &Vector3<f64>) -> Vec<Vec<f64>> {
         let is_free = |path: &Vec<Vec<f64>>| {
             path.iter()
-                .all(|posture| self.meanwhile.is_free(posture, LEAST_ROOM))
+                .all(|posture| self.meanwhile.is_free(posture, LEAST_CLEARANCE))
         };
         let mut ways = RETREATS_M
             .iter()
@@ -447,12 +447,12 @@ impl<'a> Arm<'a> {
 
     /// A path from the current posture to another.
     fn way(&self, to: &[f64], samples: &mut Samples) -> Option<Vec<Vec<f64>>> {
-        let wanted = Room {
+        let wanted = ArmClearance {
             furniture_m: WAY_CLEAR_M,
             things_m: WAY_CLEAR_M,
         };
-        let start = self.before.room(&self.start).0;
-        let mut least = wanted.least(start).least(self.before.room(to).0);
+        let start = self.before.clearance(&self.start).0;
+        let mut least = wanted.least(start).least(self.before.clearance(to).0);
         if start.furniture_m < WAY_CLEAR_M {
             // A link that only turns above the surface on which the arm is mounted keeps its
             // distance up to rounding.
@@ -486,10 +486,10 @@ impl<'a> Arm<'a> {
     }
 
     /// A pose for the hand that the arm alone should reach.
-    fn reach(&self, target: &Isometry3<f64>, n_joints: usize) -> ik::Reach {
+    fn reach(&self, target: &Isometry3<f64>, n_joints: usize) -> ik::IkRequest {
         let mut mobility = vec![0.0; n_joints];
         self.layout.arm.iter().for_each(|idx| mobility[*idx] = 1.0);
-        ik::Reach {
+        ik::IkRequest {
             target: *target,
             mobility,
         }

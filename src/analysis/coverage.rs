@@ -29,12 +29,12 @@ pub struct Coverage {
     names: BTreeMap<ChoiceName, Name>,
     /// Names of parameters and of objects.
     texts: Vec<Arc<str>>,
-    parameters: HashMap<Parameter, Vec<u64>>,
-    pairs: HashMap<[Parameter; 2], Vec<u64>>,
+    parameters: HashMap<BinnedParameter, Vec<u64>>,
+    pairs: HashMap<[BinnedParameter; 2], Vec<u64>>,
 }
 
 /// A parameter: the position of its name among the texts, and its number of bins.
-type Parameter = (usize, usize);
+type BinnedParameter = (usize, usize);
 
 /// The name of a choice.
 #[derive(Debug, Clone, PartialEq)]
@@ -96,7 +96,7 @@ struct Binned<'n> {
 }
 
 impl Binned<'_> {
-    fn parameter(&self) -> Parameter {
+    fn parameter(&self) -> BinnedParameter {
         (self.name.pooled, self.bins)
     }
 }
@@ -175,7 +175,7 @@ impl Coverage {
     /// Returns the coverage of every parameter that can vary, sorted by name.
     pub fn parameters(&self) -> Vec<ParameterCoverage> {
         let bins: usize = self.parameters.values().map(Vec::len).sum();
-        let named = |parameter: &Parameter| (&*self.texts[parameter.0], parameter.1);
+        let named = |parameter: &BinnedParameter| (&*self.texts[parameter.0], parameter.1);
         let parameters: BTreeMap<_, _> = self
             .parameters
             .iter()
@@ -201,7 +201,7 @@ impl Coverage {
     /// Returns the coverage of every pair of parameters of the scene or of one object, sorted by
     /// name.
     pub fn pairs(&self) -> Vec<PairCoverage> {
-        let named = |parameter: &Parameter| (&*self.texts[parameter.0], parameter.1);
+        let named = |parameter: &BinnedParameter| (&*self.texts[parameter.0], parameter.1);
         let pairs: BTreeMap<_, _> = self
             .pairs
             .iter()

@@ -5,6 +5,33 @@ use std::path::{Component, Path, PathBuf};
 use crate::shipped;
 use crate::{FileKind, NotPlain, Source, read_regular};
 
+/// Why a file of a project can't be read: a lower-case sentence without the path.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FileFault {
+    /// The file does not exist.
+    #[error("there is no such file")]
+    Missing,
+    /// No file with this path is embedded in the binary.
+    #[error("no built-in file has this path")]
+    NotShipped,
+    /// The permissions of the file or of its folder do not allow it.
+    #[error("reading it is not permitted")]
+    NotPermitted,
+    /// The path is that of a folder.
+    #[error("it is a folder")]
+    Folder,
+    /// Devices and pipes may have no end.
+    #[error("it is {0}, not a file")]
+    NotRegular(FileKind),
+    /// The bytes are not valid UTF-8.
+    #[error("it is not UTF-8 text")]
+    NotText,
+    /// The operating system reports another error, or the file is too large.
+    #[error("{0}")]
+    System(String),
+}
+
 /// Longest file that is read as a whole. Unit: bytes.
 const LONGEST: u64 = 1 << 30;
 /// Longest text of a configuration, a model, a rule or an ontology. Unit: bytes.
@@ -24,14 +51,15 @@ impl Files {
     ///
     /// # Errors
     /// As [`Files::read`], except that the file need not be UTF-8 and may have up to 1 GiB.
-    pub fn read_bytes(&self, path: &Path) -> Result<Vec<u8>, String> {
+    pub fn read_bytes(&self, path: &Path) -> Result<Vec<u8>, FileFault> {
         self.read_up_to(path, LONGEST)
     }
 
-    fn read_up_to(&self, path: &Path, longest: u64) -> Result<Vec<u8>, String> {
+    fn read_up_to(&self, path: &Path, longest: u64) -> Result<Vec<u8>, FileFault> {
         match self {
-            Self::Shipped => shipped::read(&slashed(&normalised(path)))
-                .ok_or_else(|| "no built-in file has this path".to_owned()),
+            Self::Shipped => {
+                shipped::read(&slashed(&normalised(path))).ok_or(FileFault::NotShipped)
+            }
             Self::Disk => read_disk(path, longest),
         }
     }
@@ -40,9 +68,8 @@ impl Files {
     /// embedded files.
     ///
     /// # Errors
-    /// Returns the reason as a lower-case sentence without the path. Devices and pipes are refused:
-    /// they may have no end.
-    pub fn read(&self, path: &Path) -> Result<Source, String> {
+    /// The reason. Devices and pipes are refused: they may have no end.
+    pub fn read(&self, path: &Path) -> Result<Source, FileFault> {
         self.read_text(path, LONGEST_TEXT)
     }
 
@@ -50,17 +77,17 @@ impl Files {
     ///
     /// # Errors
     /// As [`Files::read`].
-    pub fn read_program(&self, path: &Path) -> Result<Source, String> {
+    pub fn read_program(&self, path: &Path) -> Result<Source, FileFault> {
         self.read_text(path, LONGEST)
     }
 
-    fn read_text(&self, path: &Path, longest: u64) -> Result<Source, String> {
+    fn read_text(&self, path: &Path, longest: u64) -> Result<Source, FileFault> {
         let name = match self {
             Self::Shipped => format!("built-in:{}", slashed(&normalised(path))),
             Self::Disk => path.display().to_string(),
         };
-        let text = String::from_utf8(self.read_up_to(path, longest)?)
-            .map_err(|_| "it is not UTF-8 text")?;
+        let text =
+            String::from_utf8(self.read_up_to(path, longest)?).map_err(|_| FileFault::NotText)?;
         Ok(Source::new(name, text))
     }
 
@@ -123,11 +150,11 @@ impl Files {
 }
 
 /// Reads a regular file: opening a pipe may wait for ever, and a device may have no end.
-fn read_disk(path: &Path, longest: u64) -> Result<Vec<u8>, String> {
+fn read_disk(path: &Path, longest: u64) -> Result<Vec<u8>, FileFault> {
     read_regular(path, longest).map_err(|error| match NotPlain::of(&error) {
-        Some(NotPlain { kind, .. }) if *kind == FileKind::Folder => "it is a folder".to_owned(),
-        Some(NotPlain { kind, .. }) => format!("it is {kind}, not a file"),
-        None => describe(&error),
+        Some(NotPlain { kind, .. }) if *kind == FileKind::Folder => FileFault::Folder,
+        Some(NotPlain { kind, .. }) => FileFault::NotRegular(*kind),
+        None => system_fault(&error),
     })
 }
 
@@ -153,11 +180,11 @@ fn slashed(path: &Path) -> String {
         .join("/")
 }
 
-fn describe(error: &std::io::Error) -> String {
+fn system_fault(error: &std::io::Error) -> FileFault {
     match error.kind() {
-        std::io::ErrorKind::NotFound => "there is no such file".to_owned(),
-        std::io::ErrorKind::PermissionDenied => "reading it is not permitted".to_owned(),
-        std::io::ErrorKind::IsADirectory => "it is a folder".to_owned(),
-        _ => error.to_string().to_lowercase(),
+        std::io::ErrorKind::NotFound => FileFault::Missing,
+        std::io::ErrorKind::PermissionDenied => FileFault::NotPermitted,
+        std::io::ErrorKind::IsADirectory => FileFault::Folder,
+        _ => FileFault::System(error.to_string().to_lowercase()),
     }
 }

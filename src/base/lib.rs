@@ -39,7 +39,7 @@ pub use course::{Course, Signal, SignalKey, Solid};
 pub use deciding::DecidingSignal;
 pub use diagnostic::{Diagnostic, Diagnostics, Severity};
 pub use digest::{Digest, digest_of, program_digest, set_program_digest};
-pub use files::Files;
+pub use files::{FileFault, Files};
 pub use findings::{Findings, RuleFault, WitnessRow};
 pub use judgement::{Judgement, Outcome};
 pub use keep::{Keep, Keeping};

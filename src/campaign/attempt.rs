@@ -20,12 +20,23 @@ pub(super) struct Attempt<'a> {
 }
 
 /// The reason why there is no run.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub(super) enum AttemptFault {
     /// The scene gave no run.
+    #[error("{}", of_failure(.0))]
     Failure(Failure),
     /// The simulation crashed, and its scene can't be drawn again to record the crash.
+    #[error("{0}")]
     Crash(String),
+}
+
+fn of_failure(failure: &Failure) -> String {
+    match failure {
+        Failure::Interrupted => failure.to_string(),
+        Failure::Discard(reason) | Failure::Overlap(reason) => {
+            format!("its scene can no longer be built: {reason}")
+        }
+    }
 }
 
 impl Attempt<'_> {

@@ -377,15 +377,11 @@ fn forget_requirement(campaign: &Campaign, ontology: &mut Ontology) {
         return;
     };
     let is_required = |found: &Diagnostic| {
-        found.code == "O017"
-            && found
-                .source
-                .as_ref()
-                .and_then(file)
-                .is_some_and(|path| path == required)
+        let path = found.source.as_ref().and_then(file);
+        path.is_some_and(|path| path == required)
     };
-    let warnings = std::mem::take(&mut ontology.warnings);
-    ontology.warnings = warnings
+    let unlinked = std::mem::take(&mut ontology.unlinked);
+    ontology.unlinked = unlinked
         .into_iter()
         .filter(|found| !is_required(found))
         .collect();

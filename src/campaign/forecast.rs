@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::Env;
-use actcheck_actions as actions;
+use actcheck_actions::{self as actions, PickFault};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_config::Launcher;
 use actcheck_data::{
@@ -329,9 +329,8 @@ impl Env {
                     weakest = Some(pick);
                 }
                 Ok(_) => {}
-                Err(reason) => {
-                    reasons.push(reason.trim_start_matches(&format!("{target}: ")).to_owned())
-                }
+                Err(PickFault::NoPlan { why, .. }) => reasons.push(why.to_string()),
+                Err(fault) => reasons.push(fault.to_string()),
             }
         }
         if let Some(reason) = reasons.first() {

@@ -12,7 +12,6 @@ use rayon::prelude::*;
 
 use crate::attempt::{Attempt, time_limit};
 use crate::finished_run::{FinishedRun, RunPlace};
-use crate::replay::rerun;
 use crate::resume::{config_of, is_same_file};
 use crate::shrink::SHRUNK;
 use crate::workers::workers;
@@ -126,16 +125,13 @@ impl LastFailed {
         let make = |run: &FailedRun| {
             let choices = || Choices::recorded(&run.choices);
             let cut = time_limit(env, &options.context);
-            rerun(
-                env,
-                &Attempt {
-                    campaign: id,
-                    index: run.index,
-                    choices: &choices,
-                    cut,
-                },
-                &options.context,
-            )
+            let attempt = Attempt {
+                campaign: id,
+                index: run.index,
+                choices: &choices,
+                cut,
+            };
+            attempt.make(env, &options.context)
         };
         let numbered: Vec<(u64, &FailedRun)> = (0..).zip(&self.runs).collect();
         // At most one trace for each worker is in memory.
@@ -158,7 +154,7 @@ impl LastFailed {
                     }
                     // The evaluation of a rule was interrupted.
                     Err(_) if stop.load(Ordering::Relaxed) => end.ending = Ending::Interrupted,
-                    Err(why) => faults.push(unbuildable(&run.id, &why)),
+                    Err(why) => faults.push(unbuildable(&run.id, &why.to_string())),
                 }
             }
         }

@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use crate::attempt::{Attempt, AttemptFault};
+use crate::attempt::Attempt;
 use crate::difference::first_difference;
 use crate::finished_run::FinishedRun;
 use crate::workers::workers;
-use crate::{Env, Failure, InputChange, RunContext, TraceDifference, changes};
+use crate::{Env, InputChange, RunContext, TraceDifference, changes};
 use actcheck_actions::Cut;
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_data::{ActionEnd, Choice, ChoiceKind, Choices, Trace};
@@ -172,8 +172,8 @@ fn replay(
         choices: &|| Choices::recorded(&choices),
         cut,
     };
-    let mut is = rerun(env, &attempt, &options.context).map_err(|why| {
-        refused(detail, &why).help(
+    let mut is = attempt.make(env, &options.context).map_err(|why| {
+        refused(detail, &why.to_string()).help(
             "a model, the configuration or the program changed: see the digests in the history",
         )
     })?;
@@ -220,24 +220,6 @@ fn refused(detail: &RunDetail, why: &str) -> Diagnostic {
         "S041",
         format!("run {} can't be run again: {why}", detail.row.run),
     )
-}
-
-/// Makes a run again. A simulation crash counts as a run too.
-///
-/// # Errors
-/// The reason why there is no run, in words.
-pub(super) fn rerun(
-    env: &Env,
-    attempt: &Attempt<'_>,
-    context: &RunContext,
-) -> Result<FinishedRun, String> {
-    attempt.make(env, context).map_err(|fault| match fault {
-        AttemptFault::Failure(Failure::Interrupted) => Failure::Interrupted.to_string(),
-        AttemptFault::Failure(Failure::Discard(reason) | Failure::Overlap(reason)) => {
-            format!("its scene can no longer be built: {reason}")
-        }
-        AttemptFault::Crash(reason) => reason,
-    })
 }
 
 /// Compares the recorded choices with those made from them.

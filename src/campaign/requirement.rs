@@ -40,6 +40,7 @@ impl Requirement {
         property.needs = ontology.designators.clone();
         let mut alone = ontology.clone();
         alone.warnings = Diagnostics::new();
+        alone.unlinked = Diagnostics::new();
         alone.properties = [(iri.clone(), property)].into();
         alone.vocabulary.terms.extend(scene_facts::vocabulary());
         Ok(Some(Self {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::attempt::Attempt;
-use crate::replay::{cut_secs, rerun};
+use crate::replay::cut_secs;
 use crate::{Env, RunContext, StoredCampaign};
 use actcheck_actions::Cut;
 use actcheck_base::Diagnostic;
@@ -61,7 +61,7 @@ pub fn restorer(
             choices: &|| Choices::recorded(&choices),
             cut,
         };
-        let made = rerun(env, &attempt, &context).map_err(|why| {
+        let made = attempt.make(env, &context).map_err(|why| {
             Diagnostic::error("H031", format!("run {run} can't be simulated again: {why}"))
         })?;
         Ok(Some((made.choices, made.trace)))

@@ -6,7 +6,6 @@ use rayon::prelude::*;
 
 use crate::attempt::{Attempt, time_limit};
 use crate::finished_run::{FinishedRun, RunPlace};
-use crate::replay::rerun;
 use crate::workers::workers;
 use crate::{Env, RunContext};
 use actcheck_base::{Diagnostics, Outcome};
@@ -69,7 +68,7 @@ fn make(env: &Env, context: &RunContext) -> Result<FinishedRun, Diagnostics> {
         choices: &choices,
         cut: time_limit(env, context),
     };
-    rerun(env, &attempt, context).map_err(|why| {
+    attempt.make(env, context).map_err(|why| {
         env.campaign
             .fault("S064", "case", format!("the scene of this case can't be built: {why}"))
             .help("models, robot or program may have changed, or a value was edited: move the objects in the way")

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use actcheck_base::{Below, Diagnostic, Diagnostics, Digest};
 use actcheck_config::Campaign;
 use actcheck_data::{Mesh, ObjectModel, Part, RobotProfile, Shape};
-use actcheck_world as world;
+use actcheck_world::{self as world, DecompositionFault};
 
 /// Cache folder in the history's folder.
 const FOLDER: &str = "hulls";
@@ -22,7 +22,7 @@ const TITLE: &str = "actcheck hulls 2";
 /// Convex decompositions by the key of their mesh, cached in memory and on disk.
 struct HullCache {
     history: PathBuf,
-    known: BTreeMap<String, Result<Vec<Shape>, String>>,
+    known: BTreeMap<String, Result<Vec<Shape>, DecompositionFault>>,
 }
 
 /// Replaces the meshes of the robot and of all models that the campaign uses by convex hulls.
@@ -90,7 +90,7 @@ fn decompose_model(
     }
     match solid_parts(model, cache) {
         Ok(parts) => Arc::make_mut(model).parts = parts,
-        Err(reason) => faults.push(unusable(&format!("a mesh of the model `{name}`"), &reason)),
+        Err(reason) => faults.push(unusable(&format!("a mesh of the model `{name}`"), reason)),
     }
 }
 
@@ -133,7 +133,7 @@ pub(super) fn complete_robot(campaign: &mut Campaign) -> Result<(), world::World
 
 fn decompose_with(cache: &mut HullCache, robot: &mut RobotProfile, faults: &mut Diagnostics) {
     for (file, shapes) in &mut robot.meshes {
-        let apart: Result<Vec<Vec<Shape>>, String> = shapes
+        let apart: Result<Vec<Vec<Shape>>, DecompositionFault> = shapes
             .iter()
             .map(|shape| cache.solids_or_sheet(shape))
             .collect();
@@ -147,17 +147,20 @@ fn decompose_with(cache: &mut HullCache, robot: &mut RobotProfile, faults: &mut 
         }
         match apart {
             Ok(apart) => *shapes = apart.concat().iter().map(world::simplified).collect(),
-            Err(reason) => faults.push(unusable(&format!("the robot's mesh {file}"), &reason)),
+            Err(reason) => faults.push(unusable(&format!("the robot's mesh {file}"), reason)),
         }
     }
 }
 
-fn unusable(what: &str, reason: &str) -> Diagnostic {
+fn unusable(what: &str, reason: DecompositionFault) -> Diagnostic {
     Diagnostic::error("W037", format!("{what} is unusable: {reason}"))
         .help("a collision mesh is a closed surface around something solid")
 }
 
-fn solid_parts(model: &ObjectModel, cache: &mut HullCache) -> Result<Vec<Part>, String> {
+fn solid_parts(
+    model: &ObjectModel,
+    cache: &mut HullCache,
+) -> Result<Vec<Part>, DecompositionFault> {
     let mut parts = Vec::new();
     for part in &model.parts {
         parts.extend(
@@ -189,7 +192,7 @@ impl HullCache {
     }
 
     /// Returns the convex hulls of a mesh, or any other shape unchanged.
-    fn solids(&mut self, shape: &Shape) -> Result<Vec<Shape>, String> {
+    fn solids(&mut self, shape: &Shape) -> Result<Vec<Shape>, DecompositionFault> {
         let Shape::Mesh { mesh } = shape else {
             return Ok(vec![shape.clone()]);
         };
@@ -204,14 +207,14 @@ impl HullCache {
 
     /// As [`HullCache::solids`]; a flat mesh, such as a carpet or a marker on a robot, becomes a
     /// thin solid.
-    fn solids_or_sheet(&mut self, shape: &Shape) -> Result<Vec<Shape>, String> {
+    fn solids_or_sheet(&mut self, shape: &Shape) -> Result<Vec<Shape>, DecompositionFault> {
         self.solids(shape).or_else(|reason| match shape {
             Shape::Mesh { mesh } => world::sheet(mesh).map(|sheet| vec![sheet]).ok_or(reason),
             _ => Err(reason),
         })
     }
 
-    fn cached_or_new(&self, key: &str, mesh: &Mesh) -> Result<Vec<Shape>, String> {
+    fn cached_or_new(&self, key: &str, mesh: &Mesh) -> Result<Vec<Shape>, DecompositionFault> {
         if let Some(solids) = read(&self.history, key) {
             return Ok(solids);
         }
@@ -244,10 +247,10 @@ fn read(history: &Path, key: &str) -> Option<Vec<Shape>> {
 }
 
 /// Writes a file atomically: a reader finds all of it or none.
-fn write(history: &Path, key: &str, solids: &[Shape]) -> Result<(), String> {
-    let body = postcard::to_stdvec(solids).map_err(|error| error.to_string())?;
+fn write(history: &Path, key: &str, solids: &[Shape]) -> std::io::Result<()> {
+    let body = postcard::to_stdvec(solids).map_err(std::io::Error::other)?;
     let below = Below::new(history);
-    let entries = below.entries(history).map_err(|error| error.to_string())?;
+    let entries = below.entries(history)?;
     let has = |names: &[&str]| {
         entries
             .iter()
@@ -258,13 +261,11 @@ fn write(history: &Path, key: &str, solids: &[Shape]) -> Result<(), String> {
             .iter()
             .all(|(name, _)| name == FOLDER || name == "lock");
     if !is_ours {
-        return Err("the folder is not that of a history".to_owned());
+        return Err(std::io::Error::other("the folder is not that of a history"));
     }
-    let written = below.create_folder(&history.join(FOLDER)).and_then(|()| {
-        let bytes = [head_of(key, &body).as_bytes(), &body].concat();
-        below.write_quickly(&file_of(history, key), &bytes)
-    });
-    written.map_err(|error| error.to_string())
+    below.create_folder(&history.join(FOLDER))?;
+    let bytes = [head_of(key, &body).as_bytes(), &body].concat();
+    below.write_quickly(&file_of(history, key), &bytes)
 }
 
 /// The first line: the format, and a digest of the mesh's key and the rest.

@@ -77,7 +77,7 @@ pub fn duration(text: &str) -> Result<f64, String> {
         Ok(_) => Err(format!(
             "`{text}` must be a duration above zero, such as 90s, 10m or 2h"
         )),
-        Err(_) => duration_secs(text),
+        Err(_) => duration_secs(text).map_err(|fault| fault.to_string()),
     }
 }
 

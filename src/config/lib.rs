@@ -36,7 +36,7 @@ mod xacro;
 pub use campaign::{Campaign, Limits, Overrides};
 pub use case::Case;
 pub use case_text::{CaseText, WrittenPaths, case_text, with_skills, written_paths};
-pub use duration::duration_secs;
+pub use duration::{DurationFault, duration_secs};
 pub use load::{in_order_of_place, load, load_text, mended_robot};
 pub use other_counts::OtherCounts;
 pub use paths::{check_unnamed, resolve_path};

@@ -285,7 +285,7 @@ fn read_scene_rule(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
             .extension()
             .is_some_and(|ending| ending == "rls" || ending == "rq");
         let read = if is_rules {
-            Files::Disk.read(&path)
+            Files::Disk.read(&path).map_err(|fault| fault.to_string())
         } else {
             Err("it ends neither in `.rls` nor in `.rq`".to_owned())
         };

@@ -350,8 +350,8 @@ fn find_file(name: &str, path: PathBuf, args: Vec<String>) -> Result<Command, Mi
         ROS.iter().find(|(ending, _)| name.ends_with(ending)),
         name.ends_with(".py"),
     ) {
-        (Some((_, starter)), _) => through(starter, &path, args, "C033")?,
-        (None, true) => through(&["python3"], &path, args, "C032")?,
+        (Some((_, starter)), _) => through(starter, &path, args, Starter::Ros)?,
+        (None, true) => through(&["python3"], &path, args, Starter::Python)?,
         (None, false) if is_executable(&path) => (std::path::absolute(&path).unwrap_or(path), args),
         (None, false) => {
             return Err(Missing {
@@ -372,22 +372,49 @@ fn find_file(name: &str, path: PathBuf, args: Vec<String>) -> Result<Command, Mi
     })
 }
 
+/// The kind of a program that runs files.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Starter {
+    Ros,
+    Python,
+}
+
+impl Starter {
+    /// The code of the fault that it is not installed.
+    fn code(self) -> &'static str {
+        match self {
+            Self::Ros => "C033",
+            Self::Python => "C032",
+        }
+    }
+
+    fn help(self) -> &'static str {
+        match self {
+            Self::Ros => {
+                "install ROS and source its `setup.bash` first, or name the program that the file launches"
+            }
+            Self::Python => {
+                "install it, or name a program that runs the file: `test_launcher = \"/path/to/python my_pick.py\"`"
+            }
+        }
+    }
+}
+
 /// Resolves a file that `starter` runs.
 fn through(
     starter: &[&str],
     path: &Path,
     args: Vec<String>,
-    code: &'static str,
+    kind: Starter,
 ) -> Result<(PathBuf, Vec<String>), Missing> {
     let (program, before) = starter.split_first().unwrap_or((&"sh", &[]));
     let found = on_path(program).ok_or_else(|| Missing {
-        code,
-        message: format!("{} needs `{program}`, which is not in `PATH`", path.display()),
-        help: match code {
-            "C033" => "install ROS and source its `setup.bash` first, or name the program that the file launches",
-            _ => "install it, or name a program that runs the file: `test_launcher = \"/path/to/python my_pick.py\"`",
-        }
-        .to_owned(),
+        code: kind.code(),
+        message: format!(
+            "{} needs `{program}`, which is not in `PATH`",
+            path.display()
+        ),
+        help: kind.help().to_owned(),
     })?;
     let mut all: Vec<String> = before.iter().map(|word| (*word).to_owned()).collect();
     // The program may have another working directory.

@@ -48,10 +48,12 @@ pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
     if !found.has_errors() {
         check::never_judged(&graph, &actions, &mut found);
     }
-    let mut found = in_order_of_place(found, graph.sources());
-    if !found.has_errors() {
-        found.extend(unlinked::rule_files(&graph));
-    }
+    let found = in_order_of_place(found, graph.sources());
+    let unlinked = if found.has_errors() {
+        Diagnostics::new()
+    } else {
+        unlinked::rule_files(&graph)
+    };
     let mut digest = Digest::new();
     graph
         .sources()
@@ -69,6 +71,7 @@ pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
         vocabulary: vocabulary(&graph),
         digest: digest.finish(),
         warnings,
+        unlinked,
     })
 }
 

@@ -149,21 +149,18 @@ pub(super) fn actions(graph: &Graph, actions: &BTreeMap<String, Action>, found: 
     for (name, action) in actions {
         for fault in faults_of(graph, &known, name, action) {
             // Report a faulty inherited statement once, not for every action that inherits it.
-            let place = fault.span.as_ref().map_or(0, |span| span.start);
-            let source = fault
+            let ActionFault {
+                diagnostic,
+                of_action,
+            } = fault;
+            let place = diagnostic.span.as_ref().map_or(0, |span| span.start);
+            let source = diagnostic
                 .source
                 .as_ref()
                 .map_or(String::new(), |source| source.name.to_string());
-            let parameter_fault = fault.code == "O007";
-            if reported.insert((
-                format!(
-                    "{source} {} {}",
-                    fault.code,
-                    if parameter_fault { name } else { "" }
-                ),
-                place,
-            )) {
-                found.push(fault);
+            let action = if of_action { name } else { "" };
+            if reported.insert((format!("{source} {} {action}", diagnostic.code), place)) {
+                found.push(diagnostic);
             }
         }
     }
@@ -276,15 +273,28 @@ pub(super) fn parameters(graph: &Graph) -> BTreeSet<String> {
         .collect()
 }
 
-fn faults_of(graph: &Graph, known: &Known, name: &str, action: &Action) -> Vec<Diagnostic> {
+/// A fault of a statement about an action.
+struct ActionFault {
+    diagnostic: Diagnostic,
+    /// Whether it concerns this action alone, and not each that inherits the statement.
+    of_action: bool,
+}
+
+impl ActionFault {
+    fn inherited(diagnostic: Diagnostic) -> Self {
+        Self {
+            diagnostic,
+            of_action: false,
+        }
+    }
+}
+
+fn faults_of(graph: &Graph, known: &Known, name: &str, action: &Action) -> Vec<ActionFault> {
     let mut faults = Vec::new();
     for statement in inherited(graph, &action.iri, &names::act("hasParameter")) {
-        faults.extend(unknown_parameter(
-            graph,
-            known,
-            statement,
-            &format!("the action `{name}` has"),
-        ));
+        let unknown =
+            unknown_parameter(graph, known, statement, &format!("the action `{name}` has"));
+        faults.extend(unknown.map(ActionFault::inherited));
     }
     for predicate in ["successProperty", "precondition"] {
         for statement in inherited(graph, &action.iri, &names::act(predicate)) {
@@ -292,9 +302,14 @@ fn faults_of(graph: &Graph, known: &Known, name: &str, action: &Action) -> Vec<D
                 continue;
             };
             if known.properties.contains(property) {
-                faults.extend(missing_parameters(graph, known, name, action, property));
+                let missing = missing_parameters(graph, known, name, action, property);
+                faults.extend(missing.into_iter().map(|diagnostic| ActionFault {
+                    diagnostic,
+                    of_action: true,
+                }));
             } else {
-                faults.push(no_property(graph, known, statement, property));
+                let fault = no_property(graph, known, statement, property);
+                faults.push(ActionFault::inherited(fault));
             }
         }
     }

@@ -29,8 +29,10 @@ pub struct Ontology {
     pub vocabulary: Vocabulary,
     /// Digest of all sources, excluding the rule files.
     pub digest: String,
-    /// Warnings about statements and rule files without effect (O015 to O017).
+    /// Warnings about statements without effect (O015, O016).
     pub warnings: Diagnostics,
+    /// Warnings about rule files that no ontology links (O017).
+    pub unlinked: Diagnostics,
 }
 
 /// One action.

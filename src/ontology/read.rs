@@ -11,7 +11,7 @@ use oxrdfio::{RdfFormat, RdfParseError, RdfParser};
 
 use crate::{file_iri, literal};
 use actcheck_base::{
-    Diagnostic, Diagnostics, Files, Source, Span, Term, check_turtle, check_xml, names,
+    Diagnostic, Diagnostics, FileFault, Files, Source, Span, Term, check_turtle, check_xml, names,
 };
 
 /// Importing this IRI adds the ontology embedded in the program, independent of the importing
@@ -144,7 +144,7 @@ pub fn triples_of(source: &Source, document: usize) -> Result<Vec<[Term; 3]>, Di
         .collect())
 }
 
-fn unreadable(path: &Path, reason: &str, importer: Option<(&Source, Span)>) -> Diagnostic {
+fn unreadable(path: &Path, reason: &FileFault, importer: Option<(&Source, Span)>) -> Diagnostic {
     match importer {
         None => Diagnostic::error(
             "O001",

@@ -93,7 +93,7 @@ impl WireCommand {
                 "its command lasts 0 ticks; `ticks` must be at least 1".to_owned(),
             ));
         }
-        let mut taken = Taken {
+        let mut taken = CommandedJoints {
             joints,
             seen: Vec::new(),
         };
@@ -133,12 +133,12 @@ impl HeadTarget {
 }
 
 /// Joints that already have a target.
-struct Taken<'a> {
+struct CommandedJoints<'a> {
     joints: &'a Joints,
     seen: Vec<usize>,
 }
 
-impl Taken<'_> {
+impl CommandedJoints<'_> {
     fn list(&mut self, targets: &Targets) -> Result<Vec<(usize, f64)>, ExternalFault> {
         targets
             .0

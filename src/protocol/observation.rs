@@ -10,7 +10,7 @@ use actcheck_world::Observation;
 #[derive(Debug, Serialize)]
 pub struct Observed<'a> {
     time_s: f64,
-    joints: Joints<'a>,
+    joints: JointStates<'a>,
     base: Base,
     gripper: Gripper,
     budget_left_s: f64,
@@ -19,7 +19,7 @@ pub struct Observed<'a> {
 }
 
 #[derive(Debug, Serialize)]
-struct Joints<'a> {
+struct JointStates<'a> {
     positions: &'a [f64],
     velocities: &'a [f64],
     efforts: &'a [f64],
@@ -63,7 +63,7 @@ impl<'a> Observed<'a> {
         let [left, right] = measured.finger_efforts_n;
         Self {
             time_s: robot.elapsed_secs(),
-            joints: Joints {
+            joints: JointStates {
                 positions,
                 velocities: &measured.velocities,
                 efforts: &measured.loads,

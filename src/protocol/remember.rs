@@ -15,10 +15,10 @@ const TARGET: &str = "pickObject";
 
 /// State of the hand when it closed on the object that it now feels.
 #[derive(Debug, Clone, Default)]
-pub struct Grasped(Option<Taken>);
+pub struct Grasped(Option<RememberedGrasp>);
 
 #[derive(Debug, Clone)]
-struct Taken {
+struct RememberedGrasp {
     grasp: Isometry3<f64>,
     heading: f64,
     /// Number of percepts at that time; in later percepts the object is already in the hand.
@@ -31,12 +31,12 @@ impl Grasped {
         if !feels_in(measured, robot.grip_force_n()) {
             self.0 = None;
         } else if self.0.is_none() {
-            self.0 = Some(Taken::now(robot));
+            self.0 = Some(RememberedGrasp::now(robot));
         }
     }
 }
 
-impl Taken {
+impl RememberedGrasp {
     fn now(robot: &Operator<'_>) -> Self {
         let grasp = robot.kinematics().grasp(&robot.observe().positions);
         Self {
@@ -65,7 +65,10 @@ pub fn remember(
         .held
         .map(|held| Ok((upright(&held.pose)?, held.size_m)))
         .transpose()?;
-    let Some(taken) = grasped.0.or_else(|| told.map(|_| Taken::now(robot))) else {
+    let Some(taken) = grasped
+        .0
+        .or_else(|| told.map(|_| RememberedGrasp::now(robot)))
+    else {
         robot.hold(None);
         return Ok(());
     };
@@ -102,7 +105,7 @@ type Seen = (Isometry3<f64>, [f64; 3]);
 
 /// The last percept of an object before the hand closed: from this action, or from the pictures of
 /// an earlier one.
-fn seen_before(id: &str, taken: &Taken, robot: &Operator<'_>) -> Option<Seen> {
+fn seen_before(id: &str, taken: &RememberedGrasp, robot: &Operator<'_>) -> Option<Seen> {
     let percept = robot
         .percepts
         .iter()
@@ -118,9 +121,16 @@ fn seen_before(id: &str, taken: &Taken, robot: &Operator<'_>) -> Option<Seen> {
 }
 
 /// The held object as the reference perception sees it now, and the current state of the hand.
-fn seen_now(id: &str, robot: &mut Operator<'_>) -> Option<(Isometry3<f64>, [f64; 3], Taken)> {
+fn seen_now(
+    id: &str,
+    robot: &mut Operator<'_>,
+) -> Option<(Isometry3<f64>, [f64; 3], RememberedGrasp)> {
     let now = robot.see(id)?;
-    Some((now.pose.to_isometry(), now.size_m, Taken::now(robot)))
+    Some((
+        now.pose.to_isometry(),
+        now.size_m,
+        RememberedGrasp::now(robot),
+    ))
 }
 
 fn perceived(end: &End) -> Result<Perceived, ExternalFault> {

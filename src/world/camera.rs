@@ -12,7 +12,7 @@ use rapier3d::prelude::Collider;
 use crate::World;
 use crate::convert::{from_pose, to_real, to_vector};
 use crate::engine::{Owner, SHELL};
-use crate::rays::{Lens, Solids};
+use crate::rays::{Lens, RayScene};
 use actcheck_data::{Camera, ChoiceName, Choices, Look, Pose, Stream};
 
 /// Distance from the lens within which the camera does not see its own link: housings surround
@@ -76,7 +76,7 @@ impl World {
             stream: Stream::new(frame as u64),
         });
         let eye = self.robot.kinematics.camera(&self.robot.state().0);
-        let solids = Solids::new(lens(camera), &eye, self.solids(&eye));
+        let solids = RayScene::new(lens(camera), &eye, self.solids(&eye));
         let image = picture(camera, &solids, noise.as_ref(), stride);
         self.looked(began_secs);
         image
@@ -139,7 +139,7 @@ fn lens(camera: &Camera) -> Lens {
 
 fn picture(
     camera: &Camera,
-    solids: &Solids<'_>,
+    solids: &RayScene<'_>,
     noise: Option<&Noise<'_>>,
     stride: usize,
 ) -> DepthImage {
@@ -230,7 +230,7 @@ mod tests {
             .map(|(ahead, shape)| (Isometry3::translation(*ahead, 0.0, 0.0), *shape));
         picture(
             &SMALL,
-            &Solids::new(lens(&SMALL), &Isometry3::identity(), placed),
+            &RayScene::new(lens(&SMALL), &Isometry3::identity(), placed),
             None,
             1,
         )

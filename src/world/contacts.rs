@@ -12,7 +12,7 @@ use crate::World;
 use crate::convert::{from_pose, from_vector};
 use crate::engine::Owner;
 use crate::inertia::Twist;
-use crate::share::Share;
+use crate::ownership::Ownership;
 
 /// Contact forces below this are solver noise: a tenth of the weight of the lightest shipped model.
 /// Unit: newtons.
@@ -78,7 +78,7 @@ impl World {
             .robot
             .hand
             .as_ref()
-            .filter(|_| self.robot.share != Share::Nothing)
+            .filter(|_| self.robot.ownership != Ownership::Nothing)
         else {
             return push;
         };

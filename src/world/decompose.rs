@@ -23,6 +23,18 @@ const MOST_HULLS: u32 = 32;
 /// A mesh that fills this share of its hull counts as convex, up to rounding.
 const CONVEX: f64 = 0.97;
 
+/// Why a mesh has no convex decomposition.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DecompositionFault {
+    /// It encloses no volume.
+    #[error("its points lie in a plane")]
+    Flat,
+    /// The library fails on it.
+    #[error("it can't be decomposed into convex solids")]
+    Library,
+}
+
 /// Returns a key of a mesh's decomposition: a digest of the mesh, the parameters and the
 /// algorithm's version.
 pub fn decomposition_key(mesh: &Mesh) -> String {
@@ -38,20 +50,20 @@ pub fn decomposition_key(mesh: &Mesh) -> String {
 /// bit.
 ///
 /// # Errors
-/// A lower-case message if its points lie in a plane or the library fails on it.
-pub fn decompose(mesh: &Mesh) -> Result<Vec<Shape>, String> {
+/// [`DecompositionFault`] if its points lie in a plane or the library fails on it.
+pub fn decompose(mesh: &Mesh) -> Result<Vec<Shape>, DecompositionFault> {
     let frame = Frame::around(mesh);
     let points: Vec<Vector> = mesh
         .vertices
         .iter()
         .map(|vertex| frame.inside(vertex))
         .collect();
-    let whole = frame.hull(&points).ok_or("its points lie in a plane")?;
+    let whole = frame.hull(&points).ok_or(DecompositionFault::Flat)?;
     if mesh.volume() >= CONVEX * whole.volume() {
         return Ok(vec![whole]);
     }
     let pieces = catch_unwind(AssertUnwindSafe(|| pieces(&points, &mesh.triangles)))
-        .map_err(|_| "it can't be decomposed into convex solids")?;
+        .map_err(|_| DecompositionFault::Library)?;
     // Slivers without a hull have no relevant volume.
     let hulls: Vec<Shape> = pieces
         .iter()

@@ -14,7 +14,7 @@ use crate::gripper::Surface;
 use crate::kinematics::motion;
 use crate::mechanism::lead_with_carriers;
 use crate::needed::Needed;
-use crate::self_contact::Form;
+use crate::self_contact::LinkSolids;
 use crate::solid_depth::Material;
 use crate::surface::spread;
 use actcheck_base::did_you_mean;
@@ -75,7 +75,7 @@ pub struct Link {
     /// The same shapes for measurements, built when they are first needed.
     surface: OnceLock<Arc<Surface>>,
     /// The same shapes for collisions with other links.
-    form: OnceLock<Arc<Form>>,
+    form: OnceLock<Arc<LinkSolids>>,
     /// Points on the same shapes.
     points: Arc<Mutex<PointsBySpacing>>,
 }
@@ -111,8 +111,11 @@ impl Link {
     }
 
     /// Returns its shapes for collisions with other links.
-    pub(crate) fn form(&self) -> Arc<Form> {
-        Arc::clone(self.form.get_or_init(|| Arc::new(Form::new(&self.solids))))
+    pub(crate) fn form(&self) -> Arc<LinkSolids> {
+        Arc::clone(
+            self.form
+                .get_or_init(|| Arc::new(LinkSolids::new(&self.solids))),
+        )
     }
 }
 

@@ -3,7 +3,7 @@
 /// A soft constraint on the velocity of one joint: its impulse is `gain · (wanted − velocity)`,
 /// within bounds.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Drive {
+pub(super) struct VelocityConstraint {
     pub(super) joint: usize,
     pub(super) gain: f64,
     pub(super) wanted: f64,
@@ -13,7 +13,7 @@ pub(super) struct Drive {
     pub(super) at: Option<usize>,
 }
 
-impl Drive {
+impl VelocityConstraint {
     /// Returns a drive without effect.
     pub(super) fn none(joint: usize) -> Self {
         Self {
@@ -67,7 +67,13 @@ impl Law {
     }
 
     /// Returns the motor's drive for a substep of `secs`.
-    pub(super) fn drive(self, joint: usize, position: f64, limits: [f64; 2], secs: f64) -> Drive {
+    pub(super) fn drive(
+        self,
+        joint: usize,
+        position: f64,
+        limits: [f64; 2],
+        secs: f64,
+    ) -> VelocityConstraint {
         let resistance = secs * self.stiffness + self.damping;
         let pull = if resistance > 0.0 {
             self.stiffness / resistance
@@ -78,7 +84,7 @@ impl Law {
         let velocity = self.velocity.max(slowest).min(fastest);
         let most = self.most * secs;
         let wanted = velocity - (position - self.target) * pull;
-        Drive {
+        VelocityConstraint {
             joint,
             gain: secs * resistance,
             wanted,

@@ -35,12 +35,12 @@ pub enum WorldError {
         what: String,
     },
     /// The gripper's opening can't be measured.
-    #[error("{name}: {what}")]
+    #[error("{name}: {fault}")]
     Gripper {
         /// The URDF's path.
         name: String,
-        /// The message.
-        what: String,
+        /// The reason.
+        fault: GripperFault,
     },
     /// No joint carries the gripper.
     #[error("{name}: no joint carries its gripper: it is a hand without an arm")]
@@ -54,6 +54,77 @@ pub enum WorldError {
         /// The message.
         what: String,
     },
+}
+
+/// Why a gripper is not found, can't be measured or does not fit its profile.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GripperFault {
+    /// The surfaces of the fingers come no closer to each other.
+    #[error(
+        "the opening of its gripper can't be measured: no two surfaces of `finger_links` that face each other at \
+         the grasp frame come closer"
+    )]
+    NoTravel,
+    /// The grasp frame moves with the fingers.
+    #[error("its fingers can't be measured: the joints in `finger_joints` move the `grasp_link`")]
+    MovesGraspLink,
+    /// The joints do not move the fingers.
+    #[error("none of its `finger_joints` moves one of its `finger_links`")]
+    MovesNoFinger,
+    /// This joint turns without end.
+    #[error("the opening of its gripper can't be measured: `{0}` has no limits")]
+    Unlimited(String),
+    /// The profile states a larger opening than the fingers have. Unit: metres.
+    #[error(
+        "`max_opening_m` is {stated_m} m, but the fingers open no wider than {widest_m:.3} m at the grasp frame"
+    )]
+    TooNarrow {
+        /// `max_opening_m` of the profile.
+        stated_m: f64,
+        /// The measured opening.
+        widest_m: f64,
+    },
+    /// No name in the model is that of a part of a gripper.
+    #[error(
+        "no gripper was found: none of its movable joints or their links has a name with `finger`, `grip`, \
+         `hand`, `jaw`, `knuckle` or `thumb`, and no link one with `suction` or `vacuum`"
+    )]
+    NoNames,
+    /// The requested hand does not exist; the only other one is this suction cup.
+    #[error("no hand has `{wanted}` in a name: there is `{cup}`")]
+    UnknownHand {
+        /// The requested name.
+        wanted: String,
+        /// The link of the cup.
+        cup: String,
+    },
+    /// The requested hand does not exist among several.
+    #[error("no hand has `{wanted}` in a name: there are `{}`", hands.join("`, `"))]
+    UnknownHandOf {
+        /// The requested name.
+        wanted: String,
+        /// The links that carry hands.
+        hands: Vec<String>,
+    },
+    /// A joint of the fingers can't move. Unit: metres or radians.
+    #[error(
+        "no gripper was found: its joint `{joint}` can't move, its limits are {lower} and {upper}"
+    )]
+    Stiff {
+        /// The joint.
+        joint: String,
+        /// Its lower limit.
+        lower: f64,
+        /// Its upper limit.
+        upper: f64,
+    },
+    /// The fingers, these links, touch nothing.
+    #[error("no gripper was found: the links `{}` have no collision shapes", .0.join("`, `"))]
+    NoShapes(Vec<String>),
+    /// The links with the names of fingers do not close.
+    #[error("no two links of its gripper face each other and come closer")]
+    NoOpposition,
 }
 
 impl WorldError {

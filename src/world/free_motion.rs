@@ -9,11 +9,11 @@ use nalgebra::Isometry3;
 use rapier3d::prelude::PhysicsWorld;
 
 use crate::assemble::{STOP_DAMPING, STOP_FREQUENCY_HZ, WIDEST_RANGE};
-use crate::drive::Drive;
+use crate::drive::VelocityConstraint;
 use crate::factor::Factor;
 use crate::inertia::{Inertias, Twist, inertias};
+use crate::ownership::{Hand, Ownership};
 use crate::robot::Robot;
-use crate::share::{Hand, Share};
 
 /// Impulse per error of velocity of a coupling between two joints: nearly rigid. Unit: kilograms or
 /// kg·m².
@@ -44,14 +44,14 @@ pub(super) struct Equations {
     added: Vec<f64>,
     /// The factors found so far, since drives often return to the same bounds.
     factors: Vec<Factored>,
-    drives: Vec<Drive>,
+    drives: Vec<VelocityConstraint>,
     momenta: Vec<f64>,
 }
 
 impl Equations {
     /// Returns the factor of the equations with the drives that are not at a bound.
     fn factor(&mut self) -> &Factor {
-        let gain = |drive: &Drive| drive.at.is_none().then_some(drive.gain);
+        let gain = |drive: &VelocityConstraint| drive.at.is_none().then_some(drive.gain);
         let is_of = |(known, _): &Factored| {
             known.len() == self.drives.len()
                 && known
@@ -154,13 +154,13 @@ impl Robot {
     fn load(&self) -> Option<(&Hand, &Twist)> {
         self.hand
             .as_ref()
-            .filter(|_| self.share == Share::Hand)
+            .filter(|_| self.ownership == Ownership::Hand)
             .map(|hand| (hand, &self.push_on_hand))
     }
 
     /// Returns whether the engine gives the velocity of a joint.
     fn is_given(&self, joint: usize) -> bool {
-        self.share == Share::Hand && self.shares(joint)
+        self.ownership == Ownership::Hand && self.engine_moves(joint)
     }
 
     /// Sets the drives of all motors, followed by those of the stops that are passed. Motors in the
@@ -175,12 +175,12 @@ impl Robot {
         step.drives.truncate(n_joints);
         for (idx, (motor, position)) in self.motors.iter().zip(&self.positions).enumerate() {
             let drive = match self.is_given(idx) {
-                true => Drive::none(idx),
+                true => VelocityConstraint::none(idx),
                 false => motor.law.drive(idx, *position, limits(idx), secs),
             };
             match step.drives.get_mut(idx) {
                 Some(last) => {
-                    *last = Drive {
+                    *last = VelocityConstraint {
                         at: last.at,
                         ..drive
                     }
@@ -209,7 +209,7 @@ impl Robot {
                 let apparent =
                     *step.apparent[idx].get_or_insert_with(|| step.inertias.apparent(idx));
                 let gain = apparent / softness;
-                step.drives.push(Drive {
+                step.drives.push(VelocityConstraint {
                     joint: idx,
                     gain,
                     wanted: -past * recovery,

@@ -18,7 +18,7 @@ use rapier3d::prelude::{ContactData, ContactManifoldData, NarrowPhase};
 use crate::convert::{from_vector, to_real, to_vector};
 use crate::hull::Hull;
 use crate::neighbours::Neighbours;
-use crate::separation::{Found, Separation, Solids};
+use crate::separation::{Separation, SeparationOutcome, SolidPair};
 
 /// Creates a narrow phase that does not reuse contact points from the previous step, and computes
 /// those of hulls and cylinders in 64 bits.
@@ -169,24 +169,24 @@ fn between_solids(
         .try_normalize()
         .or(pos12.translation.try_normalize())
         .unwrap_or(Vector::X);
-    let solids = Solids::new(pos12, one, other);
+    let solids = SolidPair::new(pos12, one, other);
     let found = solids.separation_near(from_vector(last), f64::from(prediction), &mut corners);
     if let Some((known, around)) = memory {
         let gap = match &found {
-            Found::Nothing => 0.0,
-            Found::Far(_) => prediction,
-            Found::Near(found) => to_real(found.distance_m),
+            SeparationOutcome::Nothing => 0.0,
+            SeparationOutcome::Far(_) => prediction,
+            SeparationOutcome::Near(found) => to_real(found.distance_m),
         };
         known.note(around, pos12, gap, corners);
     }
     match found {
-        Found::Nothing => return false,
-        Found::Far(normal) => {
+        SeparationOutcome::Nothing => return false,
+        SeparationOutcome::Far(normal) => {
             manifold.clear();
             // The next search begins with it.
             manifold.local_n1 = to_vector(&normal);
         }
-        Found::Near(Separation {
+        SeparationOutcome::Near(Separation {
             distance_m,
             normal,
             points,

@@ -30,7 +30,7 @@ const ROUNDING_M: Real = 1e-5;
 
 /// A convex hull. Its clones share the corners.
 pub(crate) struct Hull {
-    solid: Arc<Solid>,
+    solid: Arc<HullData>,
     /// The box around it at the pose for which it was last calculated. Most hulls are at rest for
     /// many steps. With a memory, the box is relative to the middle of its bounding ball.
     last: Mutex<Option<(Pose, Aabb)>>,
@@ -39,7 +39,7 @@ pub(crate) struct Hull {
 }
 
 /// A convex hull in its own frame.
-struct Solid {
+struct HullData {
     hull: ConvexPolyhedron,
     /// The corners of the hull in their order: the coordinates x, y and z of [`LANES`] at a time.
     /// The last ones are copies of the first.
@@ -77,7 +77,7 @@ impl Hull {
             hull.compute_local_bounding_sphere(),
         );
         let thickness = hull.ccd_thickness();
-        let solid = Solid {
+        let solid = HullData {
             hull,
             corners,
             bounds,
@@ -157,7 +157,7 @@ impl Hull {
     }
 }
 
-impl Solid {
+impl HullData {
     /// Returns the box around it at a pose.
     fn bounds_at(&self, pose: &Pose) -> Aabb {
         let turn = Matrix::from_quat(pose.rotation);

@@ -6,7 +6,7 @@ use crate::Kinematics;
 
 /// A request to the solver.
 #[derive(Debug, Clone)]
-pub struct Reach {
+pub struct IkRequest {
     /// Target pose of the grasp link. Frame: that of the kinematics' root.
     pub target: Isometry3<f64>,
     /// Weight of each joint, from 0 (held fixed) to 1. Shape: one per joint.
@@ -41,7 +41,7 @@ const LARGEST_STEP: f64 = 0.3;
 /// Uses damped least squares; a joint that reaches its limit is held there and the others are
 /// solved again. Most targets that are tried are out of reach: the search ends when it gets no
 /// nearer.
-pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Option<Vec<f64>> {
+pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &IkRequest) -> Option<Vec<f64>> {
     let mut positions = started(kinematics, seed);
     let mut jacobian = vec![Vector6::zeros(); positions.len()];
     let mut joints = Mobile::new(&reach.mobility);
@@ -67,7 +67,7 @@ pub fn solve(kinematics: &Kinematics, seed: &[f64], reach: &Reach) -> Option<Vec
 pub fn solve_turned(
     kinematics: &Kinematics,
     seed: &[f64],
-    reach: &Reach,
+    reach: &IkRequest,
     most_rad: f64,
 ) -> Option<(Vec<f64>, f64)> {
     let mut positions = started(kinematics, seed);
@@ -280,7 +280,7 @@ mod tests {
                 &kinematics.grasp(&posture),
                 0.15 * libm::cos(f64::from(trial)),
             );
-            let reach = Reach {
+            let reach = IkRequest {
                 target,
                 mobility: mobility.clone(),
             };
@@ -303,7 +303,7 @@ mod tests {
         );
         // A larger turn than allowed is not a solution.
         let target = turned(&kinematics.grasp(&start), 1.0);
-        let found = solve_turned(kinematics, &start, &Reach { target, mobility }, 0.1);
+        let found = solve_turned(kinematics, &start, &IkRequest { target, mobility }, 0.1);
         assert!(found.is_none_or(|(_, turn)| turn.abs() <= 0.1));
     }
 }

@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3, Vector6
 use crate::Gripper;
 use crate::description::{Joint, JointKind, Link, RobotModel};
 use crate::inertia::Dynamics;
-use crate::self_contact::Form;
+use crate::self_contact::LinkSolids;
 use actcheck_data::{Part, Shape};
 
 /// Gravitational acceleration. Unit: m/s².
@@ -222,7 +222,7 @@ impl Kinematics {
     }
 
     /// Returns the shapes of each link for collisions with other links.
-    pub(crate) fn forms(&self) -> impl Iterator<Item = Arc<Form>> {
+    pub(crate) fn forms(&self) -> impl Iterator<Item = Arc<LinkSolids>> {
         self.model.links.iter().map(Link::form)
     }
 

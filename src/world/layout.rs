@@ -9,7 +9,7 @@ use crate::description::RobotModel;
 use crate::gripper::{Probe, links_of_fingers};
 use crate::kinematics::Mount;
 use crate::wrist;
-use crate::{BalancedJoint, Gripper, WorldError};
+use crate::{BalancedJoint, Gripper, GripperFault, WorldError};
 use actcheck_data::RobotProfile;
 
 /// Indices of the robot's joints by their role.
@@ -241,11 +241,11 @@ pub fn check_robot(profile: &RobotProfile) -> Result<(), WorldError> {
     let widest_m = Named::find(profile, &model)?.layout.gripper.widest_m();
     if profile.max_opening_m > widest_m + OPENING_SLACK_M {
         let name = profile.urdf.name.to_string();
-        let what = format!(
-            "`max_opening_m` is {} m, but the fingers open no wider than {widest_m:.3} m at the grasp frame",
-            profile.max_opening_m
-        );
-        return Err(WorldError::Gripper { name, what });
+        let fault = GripperFault::TooNarrow {
+            stated_m: profile.max_opening_m,
+            widest_m,
+        };
+        return Err(WorldError::Gripper { name, fault });
     }
     Ok(())
 }

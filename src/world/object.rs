@@ -12,7 +12,7 @@ use crate::attach::Attachment;
 use crate::convert::{to_pose, to_real, to_vector};
 use crate::engine::{LENGTH_UNIT, Owner, collider};
 use crate::furniture::slides;
-use crate::room::Ball;
+use crate::proximity::Ball;
 use crate::shell::{Hollow, hollows_of};
 use actcheck_data::{Inertia, ObjectModel, Part, Role, SceneObject};
 

@@ -34,10 +34,10 @@ impl World {
         }
     }
 
-    fn pairs(&self) -> Vec<Pair> {
+    fn pairs(&self) -> Vec<ContactPair> {
         self.touches()
             .into_iter()
-            .map(|((first, second), touch)| Pair {
+            .map(|((first, second), touch)| ContactPair {
                 first,
                 second,
                 lift_on_second_n: touch.force_n.z,
@@ -45,7 +45,7 @@ impl World {
             .collect()
     }
 
-    fn body(&self, idx: usize, object: &Object, pairs: &[Pair]) -> BodyState {
+    fn body(&self, idx: usize, object: &Object, pairs: &[ContactPair]) -> BodyState {
         let pose = self.pose_of(object);
         let mut touching = BTreeSet::new();
         let mut carriers = BTreeSet::new();
@@ -124,7 +124,7 @@ impl World {
         (low, high)
     }
 
-    fn robot_state(&self, pairs: &[Pair]) -> RobotState {
+    fn robot_state(&self, pairs: &[ContactPair]) -> RobotState {
         let joints = self.robot.joint_states();
         let positions: Vec<f64> = joints.iter().map(|joint| joint.position).collect();
         let touched_by = |finger: &[usize]| -> Vec<String> {
@@ -175,7 +175,7 @@ impl World {
 }
 
 /// Two owners in contact, ordered: floor, objects, links.
-struct Pair {
+struct ContactPair {
     first: Owner,
     second: Owner,
     /// Upward force of the first on the second. Unit: newtons.

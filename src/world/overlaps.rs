@@ -11,7 +11,7 @@ use crate::clearance::{Boxed, gap};
 use crate::convert::{from_pose, to_vector};
 use crate::engine::FLOOR_GROUP;
 use crate::object::Object;
-use crate::separation::{Found, Solids};
+use crate::separation::{SeparationOutcome, SolidPair};
 
 /// Depth up to which things touch and do not overlap. Unit: metres. Contacts are up to 1.8 mm deep
 /// in a firm grasp, and the colliders of wheels and feet are as much larger than these.
@@ -129,10 +129,10 @@ fn depth_m(one: &Collider, other: &Collider) -> f64 {
     {
         let towards = from_pose(&pose).translation.vector;
         let start = towards.try_normalize(1e-9).unwrap_or_else(Vector3::x);
-        match Solids::new(&pose, first, second).separation(start, TOUCH_M) {
-            Found::Far(_) => return 0.0,
-            Found::Near(found) => return (-found.distance_m).max(0.0),
-            Found::Nothing => {}
+        match SolidPair::new(&pose, first, second).separation(start, TOUCH_M) {
+            SeparationOutcome::Far(_) => return 0.0,
+            SeparationOutcome::Near(found) => return (-found.distance_m).max(0.0),
+            SeparationOutcome::Nothing => {}
         }
     }
     let met = contact(

@@ -56,11 +56,11 @@ impl Lens {
 }
 
 /// Shapes prepared for rays from one eye point.
-pub(super) struct Solids<'a> {
+pub(super) struct RayScene<'a> {
     lens: Lens,
     /// How far the rays of each column go left, and of each row up, per unit forwards.
     slopes: [Vec<f64>; 2],
-    solids: Vec<Solid<'a>>,
+    solids: Vec<ViewedShape<'a>>,
     /// For each tile, row by row: the shapes that may be visible in it, nearest first.
     tiles: Vec<Vec<usize>>,
 }
@@ -73,15 +73,15 @@ pub(super) struct Hit {
     solid: usize,
 }
 
-impl<'a> Solids<'a> {
+impl<'a> RayScene<'a> {
     /// Prepares shapes, with their poses, for the rays of a lens at a pose. Frame: world.
     pub(super) fn new(
         lens: Lens,
         eye: &Isometry3<f64>,
         shapes: impl Iterator<Item = (Isometry3<f64>, &'a dyn Shape)>,
     ) -> Self {
-        let solids: Vec<Solid<'_>> = shapes
-            .map(|(pose, shape)| Solid::new(eye, &pose, shape))
+        let solids: Vec<ViewedShape<'_>> = shapes
+            .map(|(pose, shape)| ViewedShape::new(eye, &pose, shape))
             .collect();
         let [columns, rows] = lens.tiles();
         let mut order: Vec<usize> = (0..solids.len()).collect();
@@ -152,7 +152,7 @@ impl<'a> Solids<'a> {
     pub(super) fn sine(&self, column: usize, row: usize, hit: Hit, length: f64) -> f64 {
         let solid = &self.solids[hit.solid];
         let ray = solid.direction(self.slopes(column, row));
-        if let Form::Box { half } = solid.form {
+        if let RayShape::Box { half } = solid.form {
             return (ray[side_at(&(solid.eye + ray * hit.along), &half)] / length)
                 .abs()
                 .min(1.0);
@@ -163,9 +163,9 @@ impl<'a> Solids<'a> {
 }
 
 /// A shape as seen from the eye. Frame of its vectors: the shape's own.
-struct Solid<'a> {
+struct ViewedShape<'a> {
     shape: &'a dyn Shape,
-    form: Form,
+    form: RayShape,
     eye: Point3<f64>,
     forwards: Vector3<f64>,
     left: Vector3<f64>,
@@ -194,7 +194,7 @@ impl Around {
 }
 
 /// Shapes with a closed-form ray intersection. Unit: metres.
-enum Form {
+enum RayShape {
     Box {
         half: Vector3<f64>,
     },
@@ -209,20 +209,20 @@ enum Form {
     Other,
 }
 
-impl<'a> Solid<'a> {
+impl<'a> ViewedShape<'a> {
     fn new(eye: &Isometry3<f64>, pose: &Isometry3<f64>, shape: &'a dyn Shape) -> Self {
         let form = match shape.as_typed_shape() {
-            TypedShape::Cuboid(cuboid) => Form::Box {
+            TypedShape::Cuboid(cuboid) => RayShape::Box {
                 half: from_vector(cuboid.half_extents),
             },
-            TypedShape::Cylinder(cylinder) => Form::Cylinder {
+            TypedShape::Cylinder(cylinder) => RayShape::Cylinder {
                 radius: f64::from(cylinder.radius),
                 half_height: f64::from(cylinder.half_height),
             },
-            TypedShape::Ball(ball) => Form::Ball {
+            TypedShape::Ball(ball) => RayShape::Ball {
                 radius: f64::from(ball.radius),
             },
-            _ => Form::Other,
+            _ => RayShape::Other,
         };
         let around = shape.compute_local_aabb();
         let (low, high) = (from_vector(around.mins), from_vector(around.maxs));
@@ -267,18 +267,18 @@ impl<'a> Solid<'a> {
     fn met_at(&self, slopes: [f64; 2], most: f64) -> Option<f64> {
         let ray = self.direction(slopes);
         let span = match self.form {
-            Form::Box { half } => box_span(&self.eye, &ray, &half),
-            Form::Cylinder {
+            RayShape::Box { half } => box_span(&self.eye, &ray, &half),
+            RayShape::Cylinder {
                 radius,
                 half_height,
             } => cylinder_span(&self.eye, &ray, radius, half_height),
-            Form::Ball { radius } => round_span(
+            RayShape::Ball { radius } => round_span(
                 self.eye.coords.dot(&ray),
                 ray.norm_squared(),
                 &self.eye.coords,
                 radius,
             ),
-            Form::Other => {
+            RayShape::Other => {
                 let ray = Ray::new(to_vector(&self.eye.coords), to_vector(&ray));
                 let met = self.shape.cast_local_ray(&ray, to_real(most), true);
                 return met.map(f64::from).filter(|along| *along < most);
@@ -294,8 +294,8 @@ impl<'a> Solid<'a> {
     fn normal(&self, ray: &Vector3<f64>, along: f64) -> Vector3<f64> {
         let point = self.eye + ray * along;
         match self.form {
-            Form::Box { half } => Vector3::ith(side_at(&point, &half), 1.0),
-            Form::Cylinder {
+            RayShape::Box { half } => Vector3::ith(side_at(&point, &half), 1.0),
+            RayShape::Cylinder {
                 radius,
                 half_height,
             } => {
@@ -306,8 +306,8 @@ impl<'a> Solid<'a> {
                     Vector3::new(point.x, 0.0, point.z)
                 }
             }
-            Form::Ball { .. } => point.coords,
-            Form::Other => {
+            RayShape::Ball { .. } => point.coords,
+            RayShape::Other => {
                 let ray = Ray::new(to_vector(&self.eye.coords), to_vector(ray));
                 // Cast slightly farther, so that rounding does not lose the hit.
                 let met = self.shape.cast_local_ray_and_get_normal(
@@ -423,7 +423,7 @@ mod tests {
                     )
                 })
                 .collect();
-            let solids = Solids::new(
+            let solids = RayScene::new(
                 LENS,
                 &eye,
                 placed.iter().map(|(pose, shape)| (*pose, *shape)),
@@ -466,7 +466,7 @@ mod tests {
             let shape = shapes[number as usize % 3].as_ref();
             let mut pose = anywhere(stream, number, 0.2);
             pose.translation.x += 1.5;
-            let solids = Solids::new(LENS, &Isometry3::identity(), [(pose, shape)].into_iter());
+            let solids = RayScene::new(LENS, &Isometry3::identity(), [(pose, shape)].into_iter());
             let (column, row) = (30, 22);
             let Some(hit) = solids.first(column, row, 9.0) else {
                 continue;

@@ -1,7 +1,7 @@
 //! The things that the robot can touch in a tick, and the shortcuts that the simulation may take
 //! where these are few.
 
-use crate::share::Share;
+use crate::ownership::Ownership;
 
 /// The things that the robot can touch in a tick.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
@@ -19,11 +19,11 @@ pub(super) enum Reach {
 
 impl Reach {
     /// Returns the part of the robot that the engine moves.
-    pub(super) fn share(self) -> Share {
+    pub(super) fn ownership(self) -> Ownership {
         match self {
-            Self::Nothing | Self::Apart => Share::Nothing,
-            Self::Hand => Share::Hand,
-            Self::All => Share::Whole,
+            Self::Nothing | Self::Apart => Ownership::Nothing,
+            Self::Hand => Ownership::Hand,
+            Self::All => Ownership::Whole,
         }
     }
 }

@@ -14,9 +14,9 @@ use crate::free_motion::Equations;
 use crate::inertia::Twist;
 use crate::layout::Layout;
 use crate::motor::Motor;
+use crate::ownership::{Hand, Ownership};
+use crate::proximity::Ball;
 use crate::resolved::{Resolved, resolved};
-use crate::room::Ball;
-use crate::share::{Hand, Share};
 use crate::{Kinematics, WorldError};
 use actcheck_data::{JointState, Pose, RobotProfile, RobotStart};
 
@@ -49,7 +49,7 @@ pub struct Robot {
     /// Velocities of the joints.
     pub(super) velocities: Vec<f64>,
     /// The part of the robot that the engine moves.
-    pub(super) share: Share,
+    pub(super) ownership: Ownership,
     /// The engine's joint that carries the hand, if it moves the hand alone.
     pub(super) carrier: Option<MultibodyJointHandle>,
     /// The hand; `None` if it can't be moved alone.
@@ -163,7 +163,7 @@ impl Robot {
             balls_of_shapes,
             velocities: vec![0.0; positions.len()],
             positions,
-            share: Share::Whole,
+            ownership: Ownership::Whole,
             carrier: None,
             hand,
             is_light: false,
@@ -181,7 +181,7 @@ impl Robot {
             motor.target = *position;
             motor.setpoint = *position;
         }
-        robot.finish_share(engine);
+        robot.finish_owned_joints(engine);
         robot.put_state(engine);
         Ok(robot)
     }
@@ -388,7 +388,7 @@ impl Robot {
             .iter()
             .zip(states)
             .enumerate()
-            .filter(|(idx, _)| self.shares(*idx))
+            .filter(|(idx, _)| self.engine_moves(*idx))
         {
             let is_spring =
                 (self.is_springy || self.is_loaded) && !self.layout.gripper.contains(idx);
@@ -533,7 +533,7 @@ pub(super) mod tests {
         for _ in 0..100 {
             let target = kinematics.grasp(&posture(&world, &mut choices));
             let seed = posture(&world, &mut choices);
-            let reach = ik::Reach {
+            let reach = ik::IkRequest {
                 target,
                 mobility: mobility.clone(),
             };

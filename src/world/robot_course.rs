@@ -208,7 +208,7 @@ impl World {
     }
 
     fn record_self_contacts(&mut self) {
-        if self.room.reach <= Reach::Apart && !self.link_pairs.pass {
+        if self.proximity.reach <= Reach::Apart && !self.link_pairs.pass {
             // They are known to be apart.
             return;
         }

@@ -13,8 +13,8 @@ use rapier3d::prelude::SharedShape;
 use crate::Kinematics;
 use crate::convert::{from_vector, to_pose, to_real, to_vector};
 use crate::engine::{Owner, collider};
-use crate::room::Ball;
-use crate::separation::{Found, Solids};
+use crate::proximity::Ball;
+use crate::separation::{SeparationOutcome, SolidPair};
 use crate::sphere_tree::{Cluster, Sphere, sphere_tree};
 use actcheck_data::Part;
 
@@ -36,8 +36,8 @@ const MANY_SOLIDS: usize = 64;
 /// The shapes of a robot's links, and the pairs of links that could collide.
 #[derive(Clone)]
 pub struct SelfContact {
-    links: Vec<Arc<Form>>,
-    pairs: Vec<Pair>,
+    links: Vec<Arc<LinkSolids>>,
+    pairs: Vec<LinkPair>,
     /// For each pair, the directions in which its solids were apart last.
     apart: Vec<Directions>,
 }
@@ -53,7 +53,7 @@ struct Directions {
 }
 
 impl Directions {
-    fn new([first, second]: [&Form; 2], remembered: bool) -> Self {
+    fn new([first, second]: [&LinkSolids; 2], remembered: bool) -> Self {
         let n_second = second.solids.len();
         let n_pairs = if remembered {
             first.solids.len() * n_second
@@ -74,14 +74,14 @@ impl Directions {
 
 /// Two links and the distance that they have to keep. Unit: metres.
 #[derive(Clone, Copy)]
-struct Pair {
+struct LinkPair {
     links: (usize, usize),
     clear_m: f64,
 }
 
 /// A convex solid with the ball and the box around it, in its link's frame.
 #[derive(Debug)]
-struct Solid {
+struct LinkSolid {
     /// Its index among the shapes of the link.
     part: usize,
     pose: EnginePose,
@@ -93,8 +93,8 @@ struct Solid {
 
 /// The convex solids of one link, in its frame.
 #[derive(Debug)]
-pub(crate) struct Form {
-    solids: Vec<Solid>,
+pub(crate) struct LinkSolids {
+    solids: Vec<LinkSolid>,
     /// Their indices, those of neighbours next to each other, and the clusters of these.
     order: Vec<usize>,
     clusters: Vec<Cluster>,
@@ -111,7 +111,7 @@ impl SelfContact {
     /// overlap in one of the `right` postures, which are known to be valid, such as the one for
     /// driving. Pairs that are close in one of these may come as close in others.
     pub fn new(kinematics: &Kinematics, right: &[Vec<f64>]) -> Self {
-        let links: Vec<Arc<Form>> = kinematics.forms().collect();
+        let links: Vec<Arc<LinkSolids>> = kinematics.forms().collect();
         let right: Vec<Vec<Isometry3<f64>>> = right
             .iter()
             .map(|posture| kinematics.links(posture))
@@ -127,7 +127,7 @@ impl SelfContact {
                 .filter(is_solid)
                 .filter(|first| neighbour != Some(*first) && !passes(*first));
             for first in others {
-                let pair = Pair {
+                let pair = LinkPair {
                     links: (first, second),
                     clear_m: CLEAR_M,
                 };
@@ -141,18 +141,19 @@ impl SelfContact {
                     CLEAR_M
                 };
                 if clear_m > 0.0 {
-                    pairs.push(Pair { clear_m, ..pair });
+                    pairs.push(LinkPair { clear_m, ..pair });
                 }
             }
         }
         Self::of(links, pairs)
     }
 
-    fn of(links: Vec<Arc<Form>>, pairs: Vec<Pair>) -> Self {
+    fn of(links: Vec<Arc<LinkSolids>>, pairs: Vec<LinkPair>) -> Self {
         let n_solids: usize = links.iter().map(|link| link.solids.len()).sum();
         let remembered = n_solids >= MANY_SOLIDS;
-        let of_pair =
-            |pair: &Pair| Directions::new([&links[pair.links.0], &links[pair.links.1]], remembered);
+        let of_pair = |pair: &LinkPair| {
+            Directions::new([&links[pair.links.0], &links[pair.links.1]], remembered)
+        };
         let apart = pairs.iter().map(of_pair).collect();
         Self {
             links,
@@ -163,7 +164,7 @@ impl SelfContact {
 
     /// Returns the pairs that overlap at these link poses.
     pub(crate) fn overlaps(&self, poses: &[Isometry3<f64>]) -> Vec<(usize, usize)> {
-        let overlap = |pair: &&Pair| gap(&self.links, **pair, poses) <= 0.0;
+        let overlap = |pair: &&LinkPair| gap(&self.links, **pair, poses) <= 0.0;
         self.pairs
             .iter()
             .filter(overlap)
@@ -192,10 +193,10 @@ impl SelfContact {
             .zip(poses)
             .map(|(link, pose)| pose * link.middle)
             .collect();
-        let is_near = |Pair {
+        let is_near = |LinkPair {
                            links: (first, second),
                            clear_m,
-                       }: &Pair| {
+                       }: &LinkPair| {
             let reach = self.links[*first].radius + self.links[*second].radius + clear_m;
             !is_beyond(middles[*first] - middles[*second], reach)
         };
@@ -210,18 +211,18 @@ impl SelfContact {
 }
 
 /// Two links alone, for measurements at many poses.
-pub(crate) struct TwoLinks([Arc<Form>; 2]);
+pub(crate) struct TwoLinks([Arc<LinkSolids>; 2]);
 
 impl TwoLinks {
     pub(crate) fn new(solids: [&[Part]; 2]) -> Self {
-        Self(solids.map(|solids| Arc::new(Form::new(solids))))
+        Self(solids.map(|solids| Arc::new(LinkSolids::new(solids))))
     }
 
     /// Whether they overlap with the first one at the origin and the second one at a pose.
     pub(crate) fn overlap(&self, pose: Isometry3<f64>) -> bool {
         gap(
             &self.0,
-            Pair {
+            LinkPair {
                 links: (0, 1),
                 clear_m: CLEAR_M,
             },
@@ -232,7 +233,7 @@ impl TwoLinks {
 
 /// Returns the distance of two links at these link poses, or their clearance if they are farther
 /// apart. Unit: metres.
-fn gap(links: &[Arc<Form>], pair: Pair, poses: &[Isometry3<f64>]) -> f64 {
+fn gap(links: &[Arc<LinkSolids>], pair: LinkPair, poses: &[Isometry3<f64>]) -> f64 {
     nearest(links, pair, poses, |solids, b_in_a, towards_b, _| {
         distance_m(solids, b_in_a, towards_b, pair.clear_m)
     })
@@ -241,8 +242,8 @@ fn gap(links: &[Arc<Form>], pair: Pair, poses: &[Isometry3<f64>]) -> f64 {
 /// Whether two links are closer than their clearance at these link poses. This takes less than half
 /// of the time of [`gap`]: a direction in which the solids are far enough apart suffices.
 fn is_closer(
-    links: &[Arc<Form>],
-    pair: Pair,
+    links: &[Arc<LinkSolids>],
+    pair: LinkPair,
     poses: &[Isometry3<f64>],
     apart: &Directions,
 ) -> bool {
@@ -260,7 +261,7 @@ fn is_closer(
 /// Whether two solids are closer than this. Unit: metres. `towards_b`: a direction in the frame of
 /// the first, and `last` that in which they were apart last.
 fn are_closer(
-    [a, b]: [&Solid; 2],
+    [a, b]: [&LinkSolid; 2],
     b_in_a: &EnginePose,
     towards_b: EngineVector,
     clear_m: f64,
@@ -304,12 +305,12 @@ fn are_closer(
         GJKResult::NoIntersection(direction) if is_apart(direction) => false,
         // Nor is it exact in 32 bits.
         _ => match separation(b_in_a, [shape_a, shape_b], towards_b, clear_m) {
-            Found::Far(direction) => {
+            SeparationOutcome::Far(direction) => {
                 last.inspect(|last| last.set(to_vector(&direction)));
                 false
             }
-            Found::Near(found) => found.distance_m < clear_m,
-            Found::Nothing => true,
+            SeparationOutcome::Near(found) => found.distance_m < clear_m,
+            SeparationOutcome::Nothing => true,
         },
     }
 }
@@ -317,7 +318,7 @@ fn are_closer(
 /// Distance of two solids, 0 if they overlap, or `far_m` if they are farther apart. Unit: metres.
 /// Other arguments as for [`are_closer`].
 fn distance_m(
-    [a, b]: [&Solid; 2],
+    [a, b]: [&LinkSolid; 2],
     b_in_a: &EnginePose,
     towards_b: EngineVector,
     far_m: f64,
@@ -334,9 +335,9 @@ fn distance_m(
         return found.map_or(0.0, |found| f64::from(found.distance));
     };
     match separation(b_in_a, [shape_a, shape_b], towards_b, far_m) {
-        Found::Far(_) => far_m,
-        Found::Near(found) => found.distance_m.max(0.0),
-        Found::Nothing => 0.0,
+        SeparationOutcome::Far(_) => far_m,
+        SeparationOutcome::Near(found) => found.distance_m.max(0.0),
+        SeparationOutcome::Nothing => 0.0,
     }
 }
 
@@ -346,22 +347,22 @@ fn separation(
     [shape_a, shape_b]: [&dyn SupportMap; 2],
     towards_b: EngineVector,
     far_m: f64,
-) -> Found {
+) -> SeparationOutcome {
     let start = from_vector(towards_b.try_normalize().unwrap_or(EngineVector::X));
-    Solids::new(b_in_a, shape_a, shape_b).separation(start, far_m)
+    SolidPair::new(b_in_a, shape_a, shape_b).separation(start, far_m)
 }
 
 /// Returns the least of the distances of all pairs of solids by `measure`, or the clearance of the
 /// links if all are farther apart. Unit: metres. `measure` gets the pose of the second solid and
 /// the direction of its middle in the frame of the first, and the indices of both.
 fn nearest(
-    links: &[Arc<Form>],
-    Pair {
+    links: &[Arc<LinkSolids>],
+    LinkPair {
         links: (first, second),
         clear_m,
-    }: Pair,
+    }: LinkPair,
     poses: &[Isometry3<f64>],
-    measure: impl Fn([&Solid; 2], &EnginePose, EngineVector, [usize; 2]) -> f64,
+    measure: impl Fn([&LinkSolid; 2], &EnginePose, EngineVector, [usize; 2]) -> f64,
 ) -> f64 {
     let (a, b) = (&links[first], &links[second]);
     let apart = poses[first] * a.middle - poses[second] * b.middle;
@@ -385,12 +386,12 @@ fn nearest(
     };
     let near_b = b.near(is_far_from_a).into_iter();
     let of_b = near_b.map(|idx| (idx, &b.solids[idx], b_in_a * b.solids[idx].ball.middle));
-    let near_a = |(_, solid, middle): &(usize, &Solid, Point3<f64>)| {
+    let near_a = |(_, solid, middle): &(usize, &LinkSolid, Point3<f64>)| {
         let way = middle - a.middle;
         !is_beyond(way, a.radius + solid.ball.radius + far)
             && turned.boxes_apart(way, [&a.half, &solid.half]) <= far
     };
-    let of_b: Vec<(usize, &Solid, Point3<f64>)> = of_b.filter(near_a).collect();
+    let of_b: Vec<(usize, &LinkSolid, Point3<f64>)> = of_b.filter(near_a).collect();
     if of_b.is_empty() {
         return clear_m;
     }
@@ -484,13 +485,13 @@ impl Ball {
     }
 }
 
-impl Form {
+impl LinkSolids {
     /// Returns the shapes with their poses in the link's frame.
     pub(crate) fn shapes(&self) -> impl Iterator<Item = (&SharedShape, &EnginePose)> {
         self.solids.iter().map(|solid| (&solid.shape, &solid.pose))
     }
 
-    /// Returns the shapes as [`Form::shapes`], each with its index among the shapes of the link.
+    /// Returns the shapes as [`LinkSolids::shapes`], each with its index among the shapes of the link.
     pub(crate) fn parts(&self) -> impl Iterator<Item = (usize, &SharedShape, &EnginePose)> {
         self.solids
             .iter()
@@ -507,7 +508,7 @@ impl Form {
             let (low, high) = solid.bounds();
             let half = (Vector3::from(high) - Vector3::from(low)) / 2.0;
             let ball = Ball::around(std::slice::from_ref(solid))?;
-            Some(Solid {
+            Some(LinkSolid {
                 part,
                 pose: form.position,
                 shape: form.shape,
@@ -528,7 +529,7 @@ impl Form {
         let half = ends.map_or(Vector3::zeros(), |(low, high)| {
             (Vector3::from(high) - Vector3::from(low)) / 2.0
         });
-        let solids: Vec<Solid> = forms.collect();
+        let solids: Vec<LinkSolid> = forms.collect();
         let mut order: Vec<usize> = (0..solids.len()).collect();
         let sphere = |idx: &usize| Sphere {
             middle: solids[*idx].ball.middle,
@@ -605,7 +606,7 @@ mod tests {
         let start = world.observe().positions;
         let itself = SelfContact::new(kinematics, std::slice::from_ref(&start));
         // Only robots of many solids remember directions.
-        let remember = |pair: &Pair| {
+        let remember = |pair: &LinkPair| {
             Directions::new(
                 [&itself.links[pair.links.0], &itself.links[pair.links.1]],
                 true,
@@ -620,7 +621,7 @@ mod tests {
                 posture[idx] = (posture[idx] + share * 2.0).clamp(joint.lower, joint.upper);
             }
             let poses = kinematics.links(&posture);
-            let least = |pair: &Pair| {
+            let least = |pair: &LinkPair| {
                 let (first, second) = pair.links;
                 let of = |link: usize| {
                     itself.links[link]
@@ -628,7 +629,8 @@ mod tests {
                         .iter()
                         .map(move |solid| (link, solid))
                 };
-                let placed = |(link, solid): (usize, &Solid)| to_pose(&poses[link]) * solid.pose;
+                let placed =
+                    |(link, solid): (usize, &LinkSolid)| to_pose(&poses[link]) * solid.pose;
                 let all = of(first).flat_map(|a| of(second).map(move |b| (a, b)));
                 let gaps = all.map(|(a, b)| {
                     let found = distance(

@@ -177,7 +177,7 @@ impl World {
 
     /// Decides for each hollow object whether it is closed in the next tick.
     pub(super) fn close_hollows(&mut self, reach: Reach) {
-        if !self.room.shortcuts.shells || reach == Reach::Nothing {
+        if !self.proximity.shortcuts.shells || reach == Reach::Nothing {
             return;
         }
         for object in 0..self.objects.len() {

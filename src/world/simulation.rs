@@ -17,10 +17,10 @@ use crate::link_pairs::LinkPairs;
 use crate::object::{self, Object};
 use crate::odometry::Tracker;
 use crate::patches::Patch;
+use crate::proximity::ProximityCache;
 use crate::reach::Reach;
 use crate::recorder::Recorder;
 use crate::robot::Robot;
-use crate::room::Room;
 use crate::suction::Cup;
 use crate::{Fault, Kinematics, Layout, Poison, WorldError, fault};
 use actcheck_data::{CONTROL_HZ, Camera, KnownKind, Pose, RobotProfile, Scene, Sensing};
@@ -74,7 +74,7 @@ pub struct World {
     pub(super) believed_from_true: Isometry3<f64>,
     pub(super) tracker: Tracker,
     pub(super) recorder: Recorder,
-    pub(super) room: Room,
+    pub(super) proximity: ProximityCache,
     pub(super) fault: Option<Fault>,
     /// The known motion of each object; empty before the first record.
     pub(super) motions: Vec<Motions>,
@@ -138,7 +138,7 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
         sensing: scene.sensing.clone(),
         believed_from_true: Isometry3::identity(),
         tracker: Tracker::default(),
-        room: Room::default(),
+        proximity: ProximityCache::default(),
         fault: None,
         motions: Vec::new(),
         panicked: None,
@@ -247,7 +247,7 @@ impl World {
         self.seal_surface();
         let poses = self.robot.kinematics.links(&self.robot.positions);
         let holding = self.robot.kinematics.holding_efforts_at(&poses);
-        let reach = self.find_room(poses);
+        let reach = self.update_proximity(poses);
         self.close_hollows(reach);
         self.step_all(reach, &holding);
     }
@@ -269,7 +269,7 @@ impl World {
                 return;
             }
             self.set_substeps(reach);
-            self.robot.hand_over(&mut self.engine, reach.share());
+            self.robot.hand_over(&mut self.engine, reach.ownership());
             self.robot
                 .control(&mut self.engine, holding, dt, self.steps_per_tick - step);
             let ends_tick = step + 1 == self.steps_per_tick;

@@ -14,7 +14,7 @@ use rapier3d::prelude::SharedShape;
 use crate::World;
 use crate::convert::{from_pose, from_vector, to_pose, to_vector};
 use crate::description::Link;
-use crate::separation::{Found, Solids};
+use crate::separation::{SeparationOutcome, SolidPair};
 use actcheck_data::Mesh;
 
 /// Depths below this are those of the pieces: no material is known so well. Unit: metres.
@@ -97,7 +97,11 @@ struct Piece<'a> {
 
 impl<'a> Piece<'a> {
     /// The pieces of a link at this pose.
-    fn of(link: &'a Link, form: &'a crate::self_contact::Form, pose: &Isometry3<f64>) -> Vec<Self> {
+    fn of(
+        link: &'a Link,
+        form: &'a crate::self_contact::LinkSolids,
+        pose: &Isometry3<f64>,
+    ) -> Vec<Self> {
         let placed = to_pose(pose);
         let piece = |(part, shape, in_link): (usize, &'a SharedShape, &'a EnginePose)| {
             let of_part = link
@@ -136,8 +140,8 @@ impl<'a> Piece<'a> {
         let towards = from_vector(b_in_a.translation)
             .try_normalize(0.0)
             .unwrap_or_else(Vector3::x);
-        match Solids::new(&b_in_a, one, two).separation(towards, KNOWN_M) {
-            Found::Near(found) if found.distance_m < 0.0 => {
+        match SolidPair::new(&b_in_a, one, two).separation(towards, KNOWN_M) {
+            SeparationOutcome::Near(found) if found.distance_m < 0.0 => {
                 let middle = Point3::from((found.points[0] + found.points[1]) / 2.0);
                 Some((-found.distance_m, from_pose(&self.pose) * middle))
             }

@@ -4,7 +4,7 @@
 //! LaValle 2000, "RRT-Connect: an efficient approach to single-query path planning").
 
 use crate::motion::space::between;
-use crate::motion::{ArmSpace, Room, Samples};
+use crate::motion::{ArmClearance, ArmSpace, Samples};
 
 /// Length of a branch. Unit: metres, as [`ArmSpace::span`] counts.
 const BRANCH_M: f64 = 0.4;
@@ -16,7 +16,7 @@ pub fn way(
     space: &ArmSpace<'_>,
     from: &[f64],
     to: &[f64],
-    least: Room,
+    least: ArmClearance,
     samples: &mut Samples,
 ) -> Option<Vec<Vec<f64>>> {
     if !space.is_free(to, least) {
@@ -41,7 +41,12 @@ struct Tree {
 impl Tree {
     /// Grows one branch towards a posture, or to it if it is near. Returns the new node, or `None`
     /// if something is in the way.
-    fn extend(&mut self, space: &ArmSpace<'_>, towards: &[f64], least: Room) -> Option<usize> {
+    fn extend(
+        &mut self,
+        space: &ArmSpace<'_>,
+        towards: &[f64],
+        least: ArmClearance,
+    ) -> Option<usize> {
         let spans = self.nodes.iter().map(|(node, _)| space.span(node, towards));
         let (nearest, span) = spans.enumerate().min_by(|a, b| a.1.total_cmp(&b.1))?;
         let end = between(
@@ -57,7 +62,12 @@ impl Tree {
     }
 
     /// Grows branches until one reaches a posture. Returns `None` if something is in the way.
-    fn reach(&mut self, space: &ArmSpace<'_>, target: &[f64], least: Room) -> Option<usize> {
+    fn reach(
+        &mut self,
+        space: &ArmSpace<'_>,
+        target: &[f64],
+        least: ArmClearance,
+    ) -> Option<usize> {
         loop {
             let end = self.extend(space, target, least)?;
             if space.span(&self.nodes[end].0, target) < 1e-9 {
@@ -82,7 +92,7 @@ fn connect(
     space: &ArmSpace<'_>,
     from: &[f64],
     to: &[f64],
-    least: Room,
+    least: ArmClearance,
     samples: &mut Samples,
 ) -> Option<Vec<Vec<f64>>> {
     // All other joints, such as the fingers, move before the arm.
@@ -119,7 +129,7 @@ fn connect(
 
 /// The path with corners removed: from each posture to the farthest one that a free straight path
 /// reaches.
-fn shortened(space: &ArmSpace<'_>, way: &[Vec<f64>], least: Room) -> Vec<Vec<f64>> {
+fn shortened(space: &ArmSpace<'_>, way: &[Vec<f64>], least: ArmClearance) -> Vec<Vec<f64>> {
     let mut kept: Vec<Vec<f64>> = way.first().cloned().into_iter().collect();
     let mut at = 0;
     while at + 1 < way.len() {

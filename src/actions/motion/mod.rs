@@ -12,4 +12,4 @@ mod tests;
 
 pub use connect::way;
 pub use samples::Samples;
-pub use space::{ArmSpace, Room, moved_links};
+pub use space::{ArmClearance, ArmSpace, moved_links};

@@ -17,14 +17,14 @@ const HALF_TURN: f64 = std::f64::consts::PI;
 
 /// Clearances of the arm. Unit: metres; negative inside.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Room {
+pub struct ArmClearance {
     /// To furniture and to the floor.
     pub furniture_m: f64,
     /// To objects.
     pub things_m: f64,
 }
 
-impl Room {
+impl ArmClearance {
     /// The smaller clearances of both.
     #[must_use]
     pub fn least(self, other: Self) -> Self {
@@ -162,9 +162,9 @@ impl<'a> ArmSpace<'a> {
     }
 
     /// The clearances of a posture, and whether it is free of self-collisions.
-    pub fn room(&self, positions: &[f64]) -> (Room, bool) {
+    pub fn clearance(&self, positions: &[f64]) -> (ArmClearance, bool) {
         let links = self.kinematics.links(positions);
-        (self.room_of(&links), !self.itself.touches(&links))
+        (self.clearance_of(&links), !self.itself.touches(&links))
     }
 
     /// The first two links of the robot that come too close to each other in a posture.
@@ -173,36 +173,37 @@ impl<'a> ArmSpace<'a> {
     }
 
     /// The clearances at these link poses.
-    fn room_of(&self, links: &[Isometry3<f64>]) -> Room {
-        let mut room = Room {
+    fn clearance_of(&self, links: &[Isometry3<f64>]) -> ArmClearance {
+        let mut clearance = ArmClearance {
             furniture_m: f64::INFINITY,
             things_m: f64::INFINITY,
         };
         for points in &self.points {
             let pose = &links[points.link];
             let farther_m = self.farther_m(points);
-            room.furniture_m = points.nearest(pose, room.furniture_m, |point| point.z);
+            clearance.furniture_m = points.nearest(pose, clearance.furniture_m, |point| point.z);
             for block in self.furniture {
-                room.furniture_m = points.nearest(pose, room.furniture_m, |point| {
+                clearance.furniture_m = points.nearest(pose, clearance.furniture_m, |point| {
                     block.distance(point) - farther_m
                 });
             }
             for pillar in self.things {
-                room.things_m = points.nearest(pose, room.things_m, |point| pillar.distance(point));
+                clearance.things_m =
+                    points.nearest(pose, clearance.things_m, |point| pillar.distance(point));
             }
         }
-        room
+        clearance
     }
 
     /// Whether all clearances at these link poses are at least these: less work than
-    /// [`ArmSpace::room_of`].
+    /// [`ArmSpace::clearance_of`].
     fn has_room(
         &self,
         links: &[Isometry3<f64>],
-        Room {
+        ArmClearance {
             furniture_m,
             things_m,
-        }: Room,
+        }: ArmClearance,
     ) -> bool {
         self.points.iter().all(|points| {
             let pose = &links[points.link];
@@ -229,13 +230,13 @@ impl<'a> ArmSpace<'a> {
     }
 
     /// Whether a posture is free of collisions and keeps these clearances.
-    pub fn is_free(&self, positions: &[f64], least: Room) -> bool {
+    pub fn is_free(&self, positions: &[f64], least: ArmClearance) -> bool {
         let links = self.kinematics.links(positions);
         self.has_room(&links, least) && !self.itself.touches(&links)
     }
 
     /// Whether the straight path between two postures is free, not counting its first end.
-    pub fn is_way_free(&self, from: &[f64], to: &[f64], least: Room) -> bool {
+    pub fn is_way_free(&self, from: &[f64], to: &[f64], least: ArmClearance) -> bool {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,

@@ -3,13 +3,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::motion::{ArmSpace, Room, Samples, way};
+use crate::motion::{ArmClearance, ArmSpace, Samples, way};
 use crate::route::{Block, Pillar};
 use actcheck_base::Files;
 use actcheck_data::{Pose, RobotStart};
 use actcheck_world::{Kinematics, Layout, Sighting, geometry};
 
-const LEAST: Room = Room {
+const LEAST: ArmClearance = ArmClearance {
     furniture_m: 0.01,
     things_m: 0.01,
 };
@@ -104,7 +104,7 @@ fn an_arm_folded_into_its_own_mast_is_in_collision() {
     let (kinematics, layout, home) = arm();
     let right = [home.clone()];
     let space = ArmSpace::new(&kinematics, &layout, &[], &[], &right);
-    let nowhere = Room {
+    let nowhere = ArmClearance {
         furniture_m: f64::NEG_INFINITY,
         things_m: f64::NEG_INFINITY,
     };

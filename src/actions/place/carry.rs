@@ -125,7 +125,7 @@ fn slimmest(robot: &Operator<'_>, held: &Held) -> Option<Vec<Vec<f64>>> {
             let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle) * hand.rotation;
             let target = base * Isometry3::from_parts(place, turned);
             hands.push(target);
-            let reach = ik::Reach {
+            let reach = ik::IkRequest {
                 target,
                 mobility: mobility.clone(),
             };
@@ -262,7 +262,7 @@ pub fn straight(robot: &Operator<'_>, from: &[f64], by: &Vector3<f64>) -> Vec<Ve
         let Some(posture) = ik::solve(
             kinematics,
             seed,
-            &ik::Reach {
+            &ik::IkRequest {
                 target,
                 mobility: mobility.clone(),
             },

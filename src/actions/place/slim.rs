@@ -121,7 +121,7 @@ impl Load<'_> {
     fn reached(&self, seed: &[f64], target: Isometry3<f64>) -> Option<Vec<f64>> {
         let mut mobility = vec![0.0; seed.len()];
         self.arm.iter().for_each(|joint| mobility[*joint] = 1.0);
-        ik::solve(self.kinematics, seed, &ik::Reach { target, mobility })
+        ik::solve(self.kinematics, seed, &ik::IkRequest { target, mobility })
     }
 
     fn is_free(&self, posture: &[f64]) -> bool {

@@ -42,7 +42,7 @@ pub struct Trend {
 }
 
 /// Failed and passed runs.
-type Runs = (u64, u64);
+type RunCounts = (u64, u64);
 
 /// A decided run: its trace, by which bit-identical runs are recognised, and whether it failed.
 type Decided = (Trace, bool);
@@ -146,7 +146,10 @@ pub fn trend(table: &OutcomeTable, of: &JudgedProperty, level: f64) -> Trend {
 
 /// Counts the runs with different traces in the first campaigns, for each number of campaigns from 1.
 /// The newest of bit-identical runs decides: their outcomes differ if the rule has changed.
-fn distinct<'a>(campaigns: impl IntoIterator<Item = &'a Vec<Decided>>, order: Order) -> Vec<Runs> {
+fn distinct<'a>(
+    campaigns: impl IntoIterator<Item = &'a Vec<Decided>>,
+    order: Order,
+) -> Vec<RunCounts> {
     // By the number of the hash: whether the newest run with it failed.
     let mut newest: Vec<Option<bool>> = Vec::new();
     let (mut failures, mut known, mut counts) = (0, 0, Vec::new());

@@ -521,9 +521,9 @@ const COLUMNS: &[Column] = &[
     ),
 ];
 
-pub(super) type Of = fn(&RowSource<'_>) -> Cell;
+pub(super) type CellOf = fn(&RowSource<'_>) -> Cell;
 
-pub(super) const fn text(name: &'static str, description: &'static str, cell: Of) -> Column {
+pub(super) const fn text(name: &'static str, description: &'static str, cell: CellOf) -> Column {
     Column {
         name,
         kind: ColumnKind::Text,
@@ -540,7 +540,7 @@ pub(super) const fn number(
     name: &'static str,
     unit: &'static str,
     description: &'static str,
-    cell: Of,
+    cell: CellOf,
 ) -> Column {
     Column {
         name,
@@ -554,7 +554,7 @@ pub(super) const fn number(
     }
 }
 
-const fn count(name: &'static str, description: &'static str, cell: Of) -> Column {
+const fn count(name: &'static str, description: &'static str, cell: CellOf) -> Column {
     Column {
         name,
         kind: ColumnKind::Count,
@@ -567,7 +567,7 @@ const fn count(name: &'static str, description: &'static str, cell: Of) -> Colum
     }
 }
 
-const fn truth(name: &'static str, description: &'static str, cell: Of) -> Column {
+const fn truth(name: &'static str, description: &'static str, cell: CellOf) -> Column {
     Column {
         name,
         kind: ColumnKind::Bool,

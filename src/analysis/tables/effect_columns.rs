@@ -1,8 +1,8 @@
 //! The columns of realised noise and of effects, which come from a run's choices and its trace.
-//! They are missing in runs of earlier versions whose trace can't be read.
+//! They are missing in runs whose trace can't be read.
 
 use crate::tables::cell::Cell;
-use crate::tables::columns::{Column, ColumnRole, number, text};
+use crate::tables::columns::{CellOf, Column, ColumnRole, number, text};
 use crate::tables::row_source::RowSource;
 
 /// Realised noise: the errors that a run drew. Errors of the target are of the first look at it.
@@ -262,13 +262,11 @@ pub(super) const EFFECTS: &[Column] = &[
     }),
 ];
 
-type Of = fn(&RowSource<'_>) -> Cell;
-
 const fn noise(
     name: &'static str,
     unit: &'static str,
     description: &'static str,
-    cell: Of,
+    cell: CellOf,
 ) -> Column {
     number(name, unit, description, cell).in_role(ColumnRole::Noise)
 }
@@ -277,12 +275,12 @@ const fn effect(
     name: &'static str,
     unit: &'static str,
     description: &'static str,
-    cell: Of,
+    cell: CellOf,
 ) -> Column {
     number(name, unit, description, cell).in_role(ColumnRole::Effect)
 }
 
-const fn noted(name: &'static str, description: &'static str, cell: Of) -> Column {
+const fn noted(name: &'static str, description: &'static str, cell: CellOf) -> Column {
     text(name, description, cell).in_role(ColumnRole::Effect)
 }
 

@@ -110,7 +110,10 @@ impl Resources {
                 self.memory_mib =
                     Some(mebibytes(value).ok_or("expected a size such as 500M or 4G")?)
             }
-            "time" => self.time_secs = Some(duration_secs(value).map(whole_secs)?),
+            "time" => {
+                let secs = duration_secs(value).map_err(|fault| fault.to_string())?;
+                self.time_secs = Some(whole_secs(secs));
+            }
             _ => *self.name(key) = Some(value.to_owned()),
         }
         Ok(())

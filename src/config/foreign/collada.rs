@@ -49,7 +49,7 @@ pub(crate) fn read(source: &Source, warnings: &mut Diagnostics) -> Result<Mesh, 
             ),
         ));
     }
-    let mut gathering = Gathering::new(root);
+    let mut gathering = SceneTriangles::new(root);
     gathering
         .scene()
         .map_err(|(node, reason)| fault(node, reason))?;
@@ -72,7 +72,7 @@ pub(crate) fn read(source: &Source, warnings: &mut Diagnostics) -> Result<Mesh, 
         .iter()
         .map(|vertex| vertex.map(|x| x * unit))
         .collect();
-    checked(vertices, gathering.triangles).map_err(|reason| fault(root, reason))
+    checked(vertices, gathering.triangles).map_err(|reason| fault(root, reason.to_string()))
 }
 
 /// Returns the length of one unit of the file in metres.
@@ -95,7 +95,7 @@ struct Geometry {
 }
 
 /// The scene's triangles so far, in the file's unit.
-struct Gathering<'a> {
+struct SceneTriangles<'a> {
     root: Node<'a>,
     /// Elements by kind and id; the first of several.
     by_id: BTreeMap<(&'a str, &'a str), Node<'a>>,
@@ -107,7 +107,7 @@ struct Gathering<'a> {
     n_nodes: usize,
 }
 
-impl<'a> Gathering<'a> {
+impl<'a> SceneTriangles<'a> {
     fn new(root: Node<'a>) -> Self {
         let mut by_id = BTreeMap::new();
         for node in root.descendants().filter(Node::is_element) {

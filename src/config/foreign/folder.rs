@@ -9,10 +9,10 @@ use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::nested::Role;
 use crate::foreign::sdf::SdfModel;
-use crate::foreign::urdf::Materials;
+use crate::foreign::urdf::{Materials, Shapeless};
 use crate::foreign::xml::{self, Node, Reader};
 use crate::foreign::{mjcf, sdf, urdf};
-use actcheck_base::{Diagnostic, Diagnostics, Files, Severity, Source, did_you_mean};
+use actcheck_base::{Diagnostic, Diagnostics, FileFault, Files, Severity, did_you_mean};
 use actcheck_data::ObjectModel;
 
 /// A model found in a folder.
@@ -102,22 +102,13 @@ fn read_sdf_model(
         .read(&path)
         .map_err(|reason| unreadable(&path, &reason))?;
     let (model, said) = match path.extension().and_then(|ending| ending.to_str()) {
-        Some("urdf") => urdf::read(&source, &path, lookup, &Materials::default()),
+        Some("urdf") => {
+            let materials = Materials::default();
+            urdf::read(&source, &path, lookup, &materials, Shapeless::Urdf)
+        }
         Some("xml") if is_mjcf(lookup.files, &path) => {
             let (urdf, materials) = mjcf::object(&source, &path, lookup.files)?;
-            let (model, said) = urdf::read(&urdf, &path, lookup, &materials);
-            (
-                model,
-                said.into_iter()
-                    .map(|fault| {
-                        if fault.code == "W038" {
-                            unseen(&source)
-                        } else {
-                            fault
-                        }
-                    })
-                    .collect(),
-            )
+            urdf::read(&urdf, &path, lookup, &materials, Shapeless::Mjcf(&source))
         }
         _ => sdf::read(&source, &path, lookup, role, depth),
     };
@@ -244,19 +235,7 @@ fn begins_with_mujoco(text: &str) -> bool {
     false
 }
 
-/// W038 in terms of MJCF.
-fn unseen(source: &Source) -> Diagnostic {
-    Diagnostic::error(
-        "W038",
-        "the object has no solid shape: none of its geoms collides",
-    )
-    .at(source, 0..0)
-    .help(
-        "set `contype` and `conaffinity` of a geom to 1; a geom for which both are 0 is only seen",
-    )
-}
-
-fn unreadable(path: &Path, reason: &str) -> Diagnostic {
+fn unreadable(path: &Path, reason: &FileFault) -> Diagnostic {
     Diagnostic::error(
         "W030",
         format!("cannot read the model {}: {reason}", path.display()),

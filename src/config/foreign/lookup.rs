@@ -4,6 +4,19 @@ use std::path::{Path, PathBuf};
 
 use actcheck_base::Files;
 
+/// Why a URI does not lead to a file.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum UriFault {
+    #[error("there is no `{path}` in {folders}")]
+    NotFound {
+        path: String,
+        /// The folders that were searched, as text.
+        folders: String,
+    },
+    #[error("`{0}://` is not supported")]
+    Scheme(String),
+}
+
 /// Folders in which `model://NAME/…` and `package://NAME/…` are looked up, in order.
 pub(crate) struct Lookup<'a> {
     pub(crate) files: &'a Files,
@@ -14,8 +27,8 @@ impl Lookup<'_> {
     /// Returns the path of a URI in a file. A URI without a scheme is relative to that file.
     ///
     /// # Errors
-    /// A lower-case message if the file does not exist or the scheme is not supported.
-    pub(crate) fn resolve(&self, uri: &str, file: &Path) -> Result<PathBuf, String> {
+    /// [`UriFault`] if the file does not exist or the scheme is not supported.
+    pub(crate) fn resolve(&self, uri: &str, file: &Path) -> Result<PathBuf, UriFault> {
         let beside = file.parent().unwrap_or(Path::new(""));
         match uri.split_once("://") {
             None => {
@@ -42,9 +55,12 @@ impl Lookup<'_> {
                     .iter()
                     .map(|folder| folder.display().to_string())
                     .collect();
-                format!("there is no `{path}` in {}", folders.join(" or "))
+                UriFault::NotFound {
+                    path: path.to_owned(),
+                    folders: folders.join(" or "),
+                }
             }),
-            Some((scheme, _)) => Err(format!("`{scheme}://` is not supported")),
+            Some((scheme, _)) => Err(UriFault::Scheme(scheme.to_owned())),
         }
     }
 

@@ -15,6 +15,29 @@ pub(crate) const MOST_TRIANGLES: usize = 2_000_000;
 /// Help text on how models name mesh files.
 pub(crate) const HOW_TO_NAME: &str = "the URI is `model://NAME/meshes/FILE`, `package://NAME/meshes/FILE` or a path relative to the model's file";
 
+/// Why a mesh file is unusable.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum MeshFileFault {
+    #[error("`.{0}` files are not supported")]
+    Format(String),
+    #[error("it is not UTF-8 text")]
+    NotText,
+    #[error("it ends too early")]
+    Cut,
+    #[error("its length does not fit the numbers of its vertices and faces")]
+    Length,
+    #[error("it is too large")]
+    TooLarge,
+    #[error("it has {0} triangles, more than {MOST_TRIANGLES}")]
+    TooManyTriangles(usize),
+    /// The reader of the format does not accept it.
+    #[error("{0}")]
+    Syntax(String),
+    /// Its points and triangles are not a mesh.
+    #[error("{0}")]
+    Mesh(String),
+}
+
 /// The contents of a mesh file.
 pub(crate) struct MeshFile {
     pub(crate) mesh: Mesh,
@@ -41,7 +64,7 @@ pub(crate) fn read(files: &Files, path: &Path) -> Result<MeshFile, Diagnostics> 
         .map(|ending| ending.to_string_lossy().to_lowercase())
         .unwrap_or_default();
     let mut warnings = Diagnostics::new();
-    let unusable = |reason: String| -> Diagnostics {
+    let unusable = |reason: MeshFileFault| -> Diagnostics {
         Diagnostic::error("W037", format!("the mesh {shown} is unusable: {reason}"))
             .help("export it again, as triangles, to stl, obj or dae")
             .into()
@@ -54,8 +77,7 @@ pub(crate) fn read(files: &Files, path: &Path) -> Result<MeshFile, Diagnostics> 
         })),
         "msh" => of_msh(&bytes),
         "dae" => {
-            let text = std::str::from_utf8(&bytes)
-                .map_err(|_| unusable("it is not UTF-8 text".to_owned()))?;
+            let text = std::str::from_utf8(&bytes).map_err(|_| unusable(MeshFileFault::NotText))?;
             return collada::read(&Source::new(shown.to_string(), text), &mut warnings).map(
                 |mesh| MeshFile {
                     mesh,
@@ -64,7 +86,7 @@ pub(crate) fn read(files: &Files, path: &Path) -> Result<MeshFile, Diagnostics> 
                 },
             );
         }
-        _ => Err(format!("`.{ending}` files are not supported")),
+        _ => Err(MeshFileFault::Format(ending)),
     };
     let mesh = mesh.map_err(unusable)?;
     Ok(MeshFile {
@@ -95,20 +117,19 @@ fn as_binary(bytes: &[u8]) -> Cow<'_, [u8]> {
 /// then these.
 ///
 /// Source: MuJoCo's documentation, "XML Reference", `asset/mesh`.
-fn of_msh(bytes: &[u8]) -> Result<Mesh, String> {
+fn of_msh(bytes: &[u8]) -> Result<Mesh, MeshFileFault> {
     let words: Vec<[u8; 4]> = bytes
         .chunks_exact(4)
         .filter_map(|word| word.try_into().ok())
         .collect();
-    let ends_early = || "it ends too early".to_owned();
     let counts = words
         .first_chunk::<4>()
-        .ok_or_else(ends_early)?
+        .ok_or(MeshFileFault::Cut)?
         .map(u32::from_le_bytes);
     let [vertices, normals, texture, faces] = counts.map(|count| count as usize);
     let before_faces = 4 + 3 * vertices + 3 * normals + 2 * texture;
     if !bytes.len().is_multiple_of(4) || words.len() != before_faces + 3 * faces {
-        return Err("its length does not fit the numbers of its vertices and faces".to_owned());
+        return Err(MeshFileFault::Length);
     }
     let (points, _) = words[4..4 + 3 * vertices].as_chunks::<3>();
     let (triangles, _) = words[before_faces..].as_chunks::<3>();
@@ -125,11 +146,11 @@ fn of_msh(bytes: &[u8]) -> Result<Mesh, String> {
 }
 
 /// Merges all meshes of a file.
-fn of_scene(scene: std::io::Result<mesh_loader::Scene>) -> Result<Mesh, String> {
-    let scene = scene.map_err(|error| error.to_string().to_lowercase())?;
+fn of_scene(scene: std::io::Result<mesh_loader::Scene>) -> Result<Mesh, MeshFileFault> {
+    let scene = scene.map_err(|error| MeshFileFault::Syntax(error.to_string().to_lowercase()))?;
     let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
     for mesh in scene.meshes {
-        let before = u32::try_from(vertices.len()).map_err(|_| "it is too large".to_owned())?;
+        let before = u32::try_from(vertices.len()).map_err(|_| MeshFileFault::TooLarge)?;
         vertices.extend(mesh.vertices.iter().map(|vertex| vertex.map(f64::from)));
         let shifted = mesh
             .faces
@@ -143,16 +164,17 @@ fn of_scene(scene: std::io::Result<mesh_loader::Scene>) -> Result<Mesh, String> 
 /// Welds a mesh.
 ///
 /// # Errors
-/// A lower-case message if the mesh is invalid or has more than [`MOST_TRIANGLES`] triangles.
-pub(crate) fn checked(vertices: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Result<Mesh, String> {
+/// [`MeshFileFault`] if the mesh is invalid or has more than [`MOST_TRIANGLES`] triangles.
+pub(crate) fn checked(
+    vertices: Vec<[f64; 3]>,
+    triangles: Vec<[u32; 3]>,
+) -> Result<Mesh, MeshFileFault> {
     if triangles.len() > MOST_TRIANGLES {
-        return Err(format!(
-            "it has {} triangles, more than {MOST_TRIANGLES}",
-            triangles.len()
-        ));
+        return Err(MeshFileFault::TooManyTriangles(triangles.len()));
     }
-    let welded = Mesh::new(vertices, triangles)?.welded();
-    Mesh::new(welded.vertices, welded.triangles)
+    let invalid = |fault| MeshFileFault::Mesh(format!("{fault}"));
+    let welded = Mesh::new(vertices, triangles).map_err(invalid)?.welded();
+    Mesh::new(welded.vertices, welded.triangles).map_err(invalid)
 }
 
 #[cfg(test)]

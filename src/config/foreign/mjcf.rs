@@ -516,15 +516,13 @@ mod tests {
     use super::*;
     use actcheck_base::Files;
 
-    fn converted(bodies: &str, more: &str) -> Result<String, String> {
+    fn converted(bodies: &str, more: &str) -> Result<String, Diagnostics> {
         let text = format!(
             "<mujoco><compiler angle=\"radian\"/><worldbody>{bodies}</worldbody>{more}</mujoco>"
         );
         let path = Path::new("robot.xml");
         let found = to_urdf(&Source::new("robot.xml", text), path, &Files::Shipped);
-        found
-            .map(|urdf| urdf.text.to_string())
-            .map_err(|faults| faults.to_string())
+        found.map(|urdf| urdf.text.to_string())
     }
 
     const BALL: &str = "<geom size=\"0.1\"/>";
@@ -593,7 +591,7 @@ mod tests {
             "<body name=\"a\"><attach model=\"hand\" body=\"palm\" prefix=\"h_\"/></body>",
             "",
         );
-        let said = said.expect_err("a hand is missing");
+        let said = said.expect_err("a hand is missing").to_string();
         assert!(
             said.contains("W035") && said.contains("the bodies that `<attach>` adds are not read"),
             "{said}"

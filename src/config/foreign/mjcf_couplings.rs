@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::foreign::mjcf_compiler::{Attributes, Compiler};
-use crate::foreign::mjcf_loops::{self, Tree};
+use crate::foreign::mjcf_loops::{self, BodyTree};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 
 /// A joint that another one follows, with the factor and the offset of the coupling.
@@ -28,7 +28,7 @@ pub(super) struct Couplings {
 impl Couplings {
     pub(super) fn read(root: Node, compiler: &Compiler, reader: &mut Reader) -> Self {
         let tendons = tendons(root);
-        let tree = Tree::read(root, compiler, reader);
+        let tree = BodyTree::read(root, compiler, reader);
         let mut found = Self {
             starts: tree.starts(),
             ..Self::default()
@@ -158,7 +158,7 @@ impl Couplings {
 
     /// Couples the two joints of each fixed tendon whose length an equality fixes: the joint
     /// without an actuator follows, of two such joints the one that follows no other yet.
-    fn add_equalities_of_tendons(&mut self, root: Node, tendons: &Tendons, tree: &Tree) {
+    fn add_equalities_of_tendons(&mut self, root: Node, tendons: &Tendons, tree: &BodyTree) {
         for equality in
             elements(root, "equality").filter(|equality| equality.has_tag_name("tendon"))
         {

@@ -44,7 +44,7 @@ struct Hinge {
     rest: f64,
 }
 
-struct Body {
+struct MjcfBody {
     parent: Option<usize>,
     pose: Isometry3<f64>,
     hinges: Vec<usize>,
@@ -60,8 +60,8 @@ struct Closure<'a> {
 
 /// The bodies and joints of a file.
 #[derive(Default)]
-pub(super) struct Tree {
-    bodies: Vec<Body>,
+pub(super) struct BodyTree {
+    bodies: Vec<MjcfBody>,
     hinges: Vec<Hinge>,
     names: BTreeMap<String, usize>,
     /// Bodies of the sites, with their places.
@@ -72,7 +72,7 @@ pub(super) struct Tree {
 pub(super) fn couplings(
     root: Node,
     compiler: &Compiler,
-    (mut tree, known): (Tree, &Couplings),
+    (mut tree, known): (BodyTree, &Couplings),
     reader: &mut Reader,
 ) -> BTreeMap<String, Mimic> {
     let mut found = BTreeMap::new();
@@ -205,7 +205,7 @@ fn line(points: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f64, f64) {
     (near(factor), near(offset), off)
 }
 
-impl Tree {
+impl BodyTree {
     /// Reads the bodies of a file. Faults of their poses are reported where links are made of them.
     pub(super) fn read(root: Node, compiler: &Compiler, reader: &Reader) -> Self {
         let mut tree = Self::default();
@@ -271,7 +271,7 @@ impl Tree {
                         self.hinges
                             .extend(hinge(joint, name, own, (compiler, reader)));
                     }
-                    self.bodies.push(Body {
+                    self.bodies.push(MjcfBody {
                         parent: body,
                         pose,
                         hinges: (first..self.hinges.len()).collect(),
@@ -346,7 +346,7 @@ impl Tree {
 
     /// Pose of a body with the joints at these positions. Frame: world.
     fn pose(&self, body: Option<usize>, positions: &[f64]) -> Isometry3<f64> {
-        let Some(Body {
+        let Some(MjcfBody {
             parent,
             pose,
             hinges,
@@ -420,7 +420,7 @@ fn hinge(
 
 /// A mechanism that one joint moves.
 struct Loop<'a> {
-    tree: &'a Tree,
+    tree: &'a BodyTree,
     closures: &'a [Closure<'a>],
     leader: usize,
     passive: &'a [usize],

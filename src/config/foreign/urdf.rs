@@ -12,7 +12,7 @@ use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::sdf::{SdfModel, possible};
 use crate::foreign::xml::{self, Bound, Node, Reader};
-use actcheck_base::{Diagnostics, Source};
+use actcheck_base::{Diagnostic, Diagnostics, Source};
 use actcheck_data::{Part, PartJoint, Pose};
 
 /// Longest chain of links; a longer one is a cycle.
@@ -41,6 +41,7 @@ pub(crate) fn read(
     path: &Path,
     lookup: &Lookup,
     materials: &Materials,
+    shapeless: Shapeless<'_>,
 ) -> (Option<SdfModel>, Diagnostics) {
     let text = repaired(&source.text);
     let document = match xml::parse_model(source, &text) {
@@ -57,6 +58,9 @@ pub(crate) fn read(
     let mut body = Body::default();
     if root.tag_name().name() == "robot" {
         body = read_robot(root, materials, &mut shapes, &mut reader);
+        if body.parts.is_empty() && !reader.found.has_errors() {
+            shapeless.report(root, &mut reader);
+        }
         body.friction = materials.friction;
     } else {
         let message = format!(
@@ -84,6 +88,45 @@ pub(crate) fn read(
         }),
         found,
     )
+}
+
+/// The consequence of a model without solid shapes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Shapeless<'a> {
+    /// W038 in terms of URDF.
+    Urdf,
+    /// W038 in terms of MJCF, in this text.
+    Mjcf(&'a Source),
+    /// None: the body is only seen.
+    Allowed,
+}
+
+impl Shapeless<'_> {
+    fn report(self, root: Node, reader: &mut Reader) {
+        match self {
+            Self::Urdf => {
+                let message =
+                    "the object has no solid shape: none of its links has a `<collision>`";
+                reader.error(
+                    "W038",
+                    root,
+                    message.to_owned(),
+                    "give a link a `<collision>`; a `<visual>` does not collide",
+                );
+            }
+            Self::Mjcf(source) => reader.found.push(
+                Diagnostic::error(
+                    "W038",
+                    "the object has no solid shape: none of its geoms collides",
+                )
+                .at(source, 0..0)
+                .help(
+                    "set `contype` and `conaffinity` of a geom to 1; a geom for which both are 0 is only seen",
+                ),
+            ),
+            Self::Allowed => {}
+        }
+    }
 }
 
 fn read_robot(root: Node, materials: &Materials, shapes: &mut Shapes, reader: &mut Reader) -> Body {
@@ -134,18 +177,7 @@ fn read_robot(root: Node, materials: &Materials, shapes: &mut Shapes, reader: &m
         .iter()
         .map(|link| link.attribute("name").unwrap_or_default())
         .collect();
-    let body = assembly.attach(bodies, &names, reader);
-    if body.parts.is_empty() && !reader.found.has_errors() {
-        let message =
-            "the object has no solid shape: none of its links has a `<collision>`".to_owned();
-        reader.error(
-            "W038",
-            root,
-            message,
-            "give a link a `<collision>`; a `<visual>` does not collide",
-        );
-    }
-    body
+    assembly.attach(bodies, &names, reader)
 }
 
 /// Reads a joint that moves a link, whose pose is known. Returns `None` after it has reported a

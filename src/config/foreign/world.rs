@@ -15,6 +15,7 @@ use crate::foreign::lookup::Lookup;
 use crate::foreign::nested::Role;
 use crate::foreign::sdf::check_version;
 use crate::foreign::sdf_pose::pose;
+use crate::foreign::urdf::Shapeless;
 use crate::foreign::xml::{self, Node, Reader};
 use crate::foreign::{folder, fronts, mjcf_world, sdf, urdf};
 use crate::{Furniture, WorldMap};
@@ -96,7 +97,7 @@ pub(crate) fn read(
         map,
         models: Vec::new(),
     };
-    let mut gathering = Gathering {
+    let mut gathering = WorldReader {
         path,
         included,
         world,
@@ -130,7 +131,7 @@ pub(crate) fn read(
 }
 
 /// A world while it is read.
-struct Gathering<'a> {
+struct WorldReader<'a> {
     path: &'a Path,
     included: &'a Included<'a>,
     world: World,
@@ -142,7 +143,7 @@ struct Gathering<'a> {
     reader: Reader<'a>,
 }
 
-impl Gathering<'_> {
+impl WorldReader<'_> {
     /// Adds all models. If slabs are the floor of the world, everything is moved down until their
     /// tops are at height 0.
     fn add_all(&mut self) {
@@ -442,14 +443,11 @@ impl Gathering<'_> {
                 self.path,
                 self.included.lookup,
                 &piece.materials,
+                Shapeless::Allowed,
             );
-            let Some(mut model) = model else {
-                // A body that is only seen has no solids.
-                self.reader.found.extend(
-                    said.into_iter()
-                        .filter(|fault| fault.code != "W038")
-                        .collect(),
-                );
+            let solid = model.filter(|model| !model.body.parts.is_empty());
+            let Some(mut model) = solid else {
+                self.reader.found.extend(said);
                 continue;
             };
             self.warn_if_movable(!piece.moves, &piece.name, root);

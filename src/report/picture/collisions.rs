@@ -62,7 +62,7 @@ fn panel(drawing: &mut Drawing, of: &Collisions, sampling: Sampling, top: f64) -
         true,
         paint::INK,
     );
-    let view = View::of(
+    let view = GoalRegion::of(
         &of.things,
         Rect {
             left: GAP_PX,
@@ -102,13 +102,13 @@ fn cross_px(force_n: f64) -> f64 {
 }
 
 /// The region around the goal that a panel shows.
-struct View {
+struct GoalRegion {
     panel: Rect,
     /// Radius of the largest circle. Unit: metres.
     radius_m: f64,
 }
 
-impl View {
+impl GoalRegion {
     fn of(things: &[PlacedThing], panel: Rect) -> Self {
         let hit = things.iter().filter(|thing| thing.force_n.is_some());
         let mut away: Vec<f64> = hit

@@ -10,7 +10,7 @@ use actcheck_data::Trace;
 use actcheck_history::RunDetail;
 
 /// A log line with its time. Unit: seconds since the run began.
-struct Line {
+struct LogLine {
     secs: f64,
     level: &'static str,
     text: String,
@@ -63,11 +63,11 @@ fn begin(trace: Option<&Trace>, idx: usize) -> f64 {
     time(idx) - time(0)
 }
 
-fn actions(run: &RunDetail, trace: Option<&Trace>) -> Vec<Line> {
+fn actions(run: &RunDetail, trace: Option<&Trace>) -> Vec<LogLine> {
     let mut lines = Vec::new();
     for (idx, action) in run.actions.iter().enumerate() {
         let (name, start) = (names::local(&action.action), begin(trace, idx));
-        let line = |secs: f64, level, event: &str| Line {
+        let line = |secs: f64, level, event: &str| LogLine {
             secs,
             level,
             text: format!("{}. {name} {event}", action.step),
@@ -108,14 +108,14 @@ fn actions(run: &RunDetail, trace: Option<&Trace>) -> Vec<Line> {
     lines
 }
 
-fn contacts(trace: Option<&Trace>) -> Vec<Line> {
+fn contacts(trace: Option<&Trace>) -> Vec<LogLine> {
     let Some(of) = trace else { return Vec::new() };
     let all = of.actions.iter().enumerate().flat_map(|(idx, action)| {
         strongest(&action.contacts).into_iter().map(move |contact| {
             let ([a, b], start) = (&contact.pair, begin(trace, idx));
             let (until, force) = (start + contact.end_secs, contact.max_force_n);
             let text = format!("{a} touches {b} until {until:.2} s, with {force:.1} N at most");
-            Line {
+            LogLine {
                 secs: start + contact.start_secs,
                 level: "TRACE",
                 text,
@@ -127,7 +127,7 @@ fn contacts(trace: Option<&Trace>) -> Vec<Line> {
 
 /// Outcomes other than passed. Failures are at the moment that decided them, all others at the end
 /// of the action.
-fn outcomes(run: &RunDetail, trace: Option<&Trace>) -> Vec<Line> {
+fn outcomes(run: &RunDetail, trace: Option<&Trace>) -> Vec<LogLine> {
     let mut lines = Vec::new();
     for (idx, action) in run.actions.iter().enumerate() {
         for judgement in &action.judgements {
@@ -151,7 +151,7 @@ fn outcomes(run: &RunDetail, trace: Option<&Trace>) -> Vec<Line> {
                 judgement.outcome.word(),
                 judgement.witness
             );
-            lines.push(Line { secs, level, text });
+            lines.push(LogLine { secs, level, text });
         }
     }
     lines

@@ -46,7 +46,7 @@ pub(crate) fn owl_closure_within(
     let mut program = Program::load(&Source::new(RULES.0, RULES.1), Path::new(""))?;
     program
         .add_facts("triple", triples.iter().map(|triple| triple.as_slice()))
-        .map_err(unusable)?;
+        .map_err(|fault| unusable(fault.to_string()))?;
     let closure = program
         .close(Engine::Fast, budget)
         .map_err(|fault| unusable(fault.to_string()))?;

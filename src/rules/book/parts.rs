@@ -4,11 +4,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::model::given::add_given;
-use crate::model::program::{Atom, Literal, Operand, Origin, Predicates, Program, Rule};
+use crate::model::program::{Atom, CheckedProgram, Literal, Operand, Origin, Predicates, Rule};
 use actcheck_base::TermId;
 
 /// Appends the rules and facts of another program.
-pub(super) fn extend(program: &mut Program, more: Program) {
+pub(super) fn extend(program: &mut CheckedProgram, more: CheckedProgram) {
     program.rules.extend(more.rules);
     for (predicate, rows) in more.facts {
         program.facts.entry(predicate).or_default().extend(rows);
@@ -85,11 +85,11 @@ pub(super) fn gather_state(predicates: &mut Predicates) -> Vec<Rule> {
 /// Keeps the library's rules that some property reads, directly or indirectly. SPARQL reads all
 /// snapshots.
 pub(super) fn needed<'p>(
-    mut library: Program,
-    properties: impl Iterator<Item = &'p Program>,
+    mut library: CheckedProgram,
+    properties: impl Iterator<Item = &'p CheckedProgram>,
     snapshots: bool,
     predicates: &Predicates,
-) -> Program {
+) -> CheckedProgram {
     let bodies = |rules: &[Rule]| -> Vec<usize> { rules.iter().flat_map(Rule::reads).collect() };
     let mut needed: BTreeSet<usize> = properties
         .flat_map(|program| bodies(&program.rules))
@@ -122,7 +122,10 @@ pub(super) fn needed<'p>(
 ///
 /// The first are evaluated with each property that needs them: a run without a course breaks only
 /// these properties.
-pub(super) fn split_timed(library: Program, reads: impl Fn(&Rule) -> bool) -> (Program, Program) {
+pub(super) fn split_timed(
+    library: CheckedProgram,
+    reads: impl Fn(&Rule) -> bool,
+) -> (CheckedProgram, CheckedProgram) {
     let timed: Vec<usize> = library
         .rules
         .iter()
@@ -153,8 +156,11 @@ fn with_dependents(rules: &[Rule], mut waiting: Vec<usize>) -> BTreeSet<usize> {
 }
 
 /// Splits a program into the rules and facts of some predicates, and the rest.
-fn partitioned(program: Program, predicates: &BTreeSet<usize>) -> (Program, Program) {
-    let (mut inside, mut outside) = (Program::default(), Program::default());
+fn partitioned(
+    program: CheckedProgram,
+    predicates: &BTreeSet<usize>,
+) -> (CheckedProgram, CheckedProgram) {
+    let (mut inside, mut outside) = (CheckedProgram::default(), CheckedProgram::default());
     for rule in program.rules {
         let target = if predicates.contains(&rule.head.predicate) {
             &mut inside
@@ -175,7 +181,10 @@ fn partitioned(program: Program, predicates: &BTreeSet<usize>) -> (Program, Prog
 }
 
 /// Splits the rules into those that read only the ontology, directly or indirectly, and the rest.
-pub(super) fn split_fixed(program: Program, predicates: &Predicates) -> (Program, Program) {
+pub(super) fn split_fixed(
+    program: CheckedProgram,
+    predicates: &Predicates,
+) -> (CheckedProgram, CheckedProgram) {
     let given = |id: &usize| predicates.get(*id).given && predicates.get(*id).name != "ontology";
     let moving = with_dependents(
         &program.rules,

@@ -24,7 +24,7 @@ use crate::engine::meter::Meter;
 use crate::engine::plan::Indexes;
 use crate::engine::reading::Verdict;
 use crate::model::given::Phases;
-use crate::model::program::{Predicates, Program, Rule};
+use crate::model::program::{CheckedProgram, Predicates, Rule};
 use crate::model::universe::Universe;
 #[cfg(feature = "sparql")]
 use crate::sparql::{dataset::Statements, query::Query, unchanging::is_unchanging};
@@ -90,6 +90,7 @@ impl Preparing {
 
     pub(crate) fn run(mut self, ontology: &Ontology) -> Result<RuleBook, Diagnostics> {
         self.diagnostics.extend(ontology.warnings.clone());
+        self.diagnostics.extend(ontology.unlinked.clone());
         let phases = Phases::intern(&mut self.terms);
         let (libraries, properties) = self.parse(ontology);
         let vocabulary =
@@ -102,7 +103,7 @@ impl Preparing {
             checking.define(syntax, Role::Property(*scope));
             define_moment(&mut checking, syntax, *scope);
         }
-        let mut library = Program::default();
+        let mut library = CheckedProgram::default();
         for syntax in &libraries {
             extend(&mut library, checking.rules(syntax, Role::Library));
         }
@@ -173,8 +174,8 @@ impl Preparing {
         mut self,
         ontology: &Ontology,
         phases: Phases,
-        library: Program,
-        mut programs: BTreeMap<usize, Program>,
+        library: CheckedProgram,
+        mut programs: BTreeMap<usize, CheckedProgram>,
         syntaxes: &[(usize, &Property, Syntax)],
         predicates: Predicates,
     ) -> Result<RuleBook, Diagnostics> {
@@ -210,7 +211,7 @@ impl Preparing {
         let (fixed, moving) = split_fixed(library, &predicates);
         let fixed = self.plan(fixed, &predicates, &mut indexes);
         let libraries = self.plan(moving, &predicates, &mut indexes);
-        let program_reads_course = |program: &Program| {
+        let program_reads_course = |program: &CheckedProgram| {
             program
                 .rules
                 .iter()
@@ -275,8 +276,8 @@ impl Preparing {
     fn types_and_units(
         &mut self,
         ontology: &Ontology,
-        library: &Program,
-        programs: &BTreeMap<usize, Program>,
+        library: &CheckedProgram,
+        programs: &BTreeMap<usize, CheckedProgram>,
         properties: &[(usize, &Property, Syntax)],
         predicates: &Predicates,
     ) {
@@ -311,8 +312,8 @@ impl Preparing {
     fn unchanging(
         &mut self,
         ontology: &Ontology,
-        library: &Program,
-        programs: &BTreeMap<usize, Program>,
+        library: &CheckedProgram,
+        programs: &BTreeMap<usize, CheckedProgram>,
         properties: &[(usize, &Property, Syntax)],
         (predicates, phases): (&Predicates, Phases),
     ) {
@@ -335,8 +336,8 @@ impl Preparing {
     /// Warns of properties that depend on the order of a contact's two sides.
     fn one_sided(
         &mut self,
-        library: &Program,
-        programs: &BTreeMap<usize, Program>,
+        library: &CheckedProgram,
+        programs: &BTreeMap<usize, CheckedProgram>,
         properties: &[(usize, &Property, Syntax)],
         predicates: &Predicates,
     ) {
@@ -414,7 +415,7 @@ impl Preparing {
 
     /// Reports library rules that derive facts of the snapshots from the course of the action:
     /// every property reads the snapshots, also in runs without a course.
-    fn only_own_predicates(&mut self, timed: &Program, predicates: &Predicates) {
+    fn only_own_predicates(&mut self, timed: &CheckedProgram, predicates: &Predicates) {
         for rule in timed
             .rules
             .iter()
@@ -456,7 +457,7 @@ impl Preparing {
 
     /// Checks that the whole library can be stratified, including unused rules. Returns an empty
     /// program if it can't.
-    fn stratified(&mut self, library: Program, predicates: &Predicates) -> Program {
+    fn stratified(&mut self, library: CheckedProgram, predicates: &Predicates) -> CheckedProgram {
         match stratify(
             &library.rules,
             predicates,
@@ -465,14 +466,14 @@ impl Preparing {
             Ok(_) => library,
             Err(found) => {
                 self.diagnostics.extend(found);
-                Program::default()
+                CheckedProgram::default()
             }
         }
     }
 
     fn plan(
         &mut self,
-        program: Program,
+        program: CheckedProgram,
         predicates: &Predicates,
         indexes: &mut Indexes,
     ) -> Planned {
@@ -485,7 +486,7 @@ impl Preparing {
             }
             Err(found) => {
                 self.diagnostics.extend(found);
-                Planned::new(Program::default(), Vec::new(), indexes, &|_| None)
+                Planned::new(CheckedProgram::default(), Vec::new(), indexes, &|_| None)
             }
         }
     }

@@ -6,7 +6,7 @@ use crate::model::values::literal;
 use actcheck_base::{Term, names};
 
 /// The parts of a moment, as text; empty if its datatype has none.
-struct Parts {
+struct DateParts {
     date: String,
     time: String,
     /// `Z`, `+02:00`, or empty.
@@ -14,7 +14,7 @@ struct Parts {
 }
 
 /// Returns the parts of an `xsd:dateTime`, `xsd:date` or `xsd:time`.
-fn parts(term: &Term) -> Option<Parts> {
+fn parts(term: &Term) -> Option<DateParts> {
     let Term::Literal(text, datatype) = term else {
         return None;
     };
@@ -45,7 +45,7 @@ fn parts(term: &Term) -> Option<Parts> {
             String::new()
         }
     };
-    Some(Parts {
+    Some(DateParts {
         date: of(kind != "time", date),
         time: of(kind != "date", time),
         zone: zone.to_owned(),

@@ -251,11 +251,21 @@ fn bounded<T: Send + 'static>(
     }
 }
 
+/// Why a pattern is invalid.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum PatternFault {
+    #[error("unknown flag `{0}`; the flags are i, m, s, x and q")]
+    Flag(char),
+    /// The last line of the library's message.
+    #[error("{0}")]
+    Syntax(String),
+}
+
 /// Compiles a pattern without flags.
 ///
 /// # Errors
-/// The reason why the pattern is invalid.
-pub(crate) fn compile_pattern(pattern: &str) -> Result<regex::Regex, String> {
+/// [`PatternFault`] if the pattern is invalid.
+pub(crate) fn compile_pattern(pattern: &str) -> Result<regex::Regex, PatternFault> {
     compile_pattern_as(pattern, "")
 }
 
@@ -263,12 +273,10 @@ pub(crate) fn compile_pattern(pattern: &str) -> Result<regex::Regex, String> {
 /// linear in the text.
 ///
 /// # Errors
-/// The reason why the pattern or a flag is invalid.
-pub(crate) fn compile_pattern_as(pattern: &str, flags: &str) -> Result<regex::Regex, String> {
+/// [`PatternFault`] if the pattern or a flag is invalid.
+pub(crate) fn compile_pattern_as(pattern: &str, flags: &str) -> Result<regex::Regex, PatternFault> {
     if let Some(flag) = flags.chars().find(|flag| !"imsxq".contains(*flag)) {
-        return Err(format!(
-            "unknown flag `{flag}`; the flags are i, m, s, x and q"
-        ));
+        return Err(PatternFault::Flag(flag));
     }
     let has = |flag| flags.contains(flag);
     let escaped = if has('q') {
@@ -285,13 +293,9 @@ pub(crate) fn compile_pattern_as(pattern: &str, flags: &str) -> Result<regex::Re
         .dot_matches_new_line(has('s'))
         .ignore_whitespace(has('x') && !has('q'));
     builder.build().map_err(|error| {
-        error
-            .to_string()
-            .lines()
-            .last()
-            .unwrap_or("syntax error")
-            .trim_start_matches("error: ")
-            .to_owned()
+        let message = error.to_string();
+        let last = message.lines().last().unwrap_or("syntax error");
+        PatternFault::Syntax(last.trim_start_matches("error: ").to_owned())
     })
 }
 

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::builtins;
 use crate::check::translate::translate;
 use crate::model::given::{GIVEN, VERDICT};
-use crate::model::program::{MAX_ARITY, Predicate, Predicates, Program, Scope};
+use crate::model::program::{CheckedProgram, MAX_ARITY, Predicate, Predicates, Scope};
 use crate::syntax::limits::{FAULT_LIMIT, LITERAL_LIMIT, RULE_LIMIT, WARNING_LIMIT};
 use crate::syntax::{AtomSyntax, LiteralSyntax, Statement, Syntax, TemporalOperator};
 use actcheck_base::{Diagnostic, Diagnostics, Source, Span, Term, Terms, did_you_mean, names};
@@ -45,6 +45,8 @@ pub(crate) struct Checking<'a> {
     pub(crate) derived_terms: BTreeSet<String>,
     /// Where each predicate was first defined.
     pub(crate) defined: BTreeMap<(Scope, String), Definition>,
+    /// Names that begin with a capital, of which a warning was given.
+    pub(crate) bare_names: BTreeSet<String>,
     pub(crate) diagnostics: Diagnostics,
     /// Number of errors reported so far.
     pub(crate) errors: usize,
@@ -79,6 +81,7 @@ impl<'a> Checking<'a> {
             split: true,
             derived_terms: BTreeSet::new(),
             defined: BTreeMap::new(),
+            bare_names: BTreeSet::new(),
             diagnostics: Diagnostics::new(),
             errors: 0,
         }
@@ -307,7 +310,7 @@ impl<'a> Checking<'a> {
     }
 
     /// Second pass: checks and translates the rules of a file.
-    pub(crate) fn rules(&mut self, syntax: &Syntax, role: Role) -> Program {
+    pub(crate) fn rules(&mut self, syntax: &Syntax, role: Role) -> CheckedProgram {
         let program = translate(self, syntax, role);
         // After a syntax error, a missing definition may be in the part that was not parsed.
         if let Role::Property(scope) = role

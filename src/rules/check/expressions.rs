@@ -162,12 +162,7 @@ impl Translation<'_, '_> {
             );
             let message = format!("`{name}` is a constant that no fact has");
             // Once for each name, not for each place.
-            if !self
-                .checking
-                .diagnostics
-                .iter()
-                .any(|known| known.code == "R047" && known.message == message)
-            {
+            if self.checking.bare_names.insert(name.to_owned()) {
                 self.checking
                     .warning("R047", self.source, span, message, help);
             }

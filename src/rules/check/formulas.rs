@@ -7,7 +7,7 @@ use crate::check::left::Left;
 use crate::model::expression::Expr;
 use crate::model::program::{Literal, Rule};
 use crate::syntax::Comparison;
-use crate::temporal::{Formula, Quantity};
+use crate::temporal::{CheckedFormula, Quantity};
 use actcheck_base::{Diagnostic, Diagnostics, Source, Span, names};
 
 /// Samples of a course per second.
@@ -50,7 +50,7 @@ impl Bound {
         for rule in rules {
             for formula in formulas(rule) {
                 formula.visit(&mut |part| {
-                    if let Formula::Temporal { from, to, span, .. } = part
+                    if let CheckedFormula::Temporal { from, to, span, .. } = part
                         && (*from > 0.0 || to.is_finite())
                     {
                         let (source, span) = (rule.origin.source.clone(), span.clone());
@@ -108,7 +108,7 @@ pub(crate) fn check(rules: &[Rule], diagnostics: &mut Diagnostics) {
 }
 
 /// Returns the formulas of a rule's conditions.
-pub(crate) fn formulas(rule: &Rule) -> impl Iterator<Item = &Formula> {
+pub(crate) fn formulas(rule: &Rule) -> impl Iterator<Item = &CheckedFormula> {
     rule.body.iter().flat_map(|literal| match literal {
         Literal::Test {
             value: Expr::Timed(timed),
@@ -119,7 +119,7 @@ pub(crate) fn formulas(rule: &Rule) -> impl Iterator<Item = &Formula> {
 }
 
 /// Returns the formulas of a rule's conditions, to be changed.
-pub(crate) fn formulas_mut(rule: &mut Rule) -> impl Iterator<Item = &mut Formula> {
+pub(crate) fn formulas_mut(rule: &mut Rule) -> impl Iterator<Item = &mut CheckedFormula> {
     rule.body.iter_mut().flat_map(|literal| match literal {
         Literal::Test {
             value: Expr::Timed(timed),
@@ -130,9 +130,9 @@ pub(crate) fn formulas_mut(rule: &mut Rule) -> impl Iterator<Item = &mut Formula
 }
 
 /// Returns the fault of a formula itself, without those of its parts.
-fn fault_of(formula: &Formula) -> Option<(Diagnostic, Span)> {
+fn fault_of(formula: &CheckedFormula) -> Option<(Diagnostic, Span)> {
     match formula {
-        Formula::Compare { span, .. } => {
+        CheckedFormula::Compare { span, .. } => {
             let holds = constant(formula)?;
             let help = "compare it with another number, or leave the condition out";
             Some((
@@ -140,7 +140,7 @@ fn fault_of(formula: &Formula) -> Option<(Diagnostic, Span)> {
                 span.clone(),
             ))
         }
-        Formula::And(parts) => {
+        CheckedFormula::And(parts) => {
             let span = exclusive(parts)?;
             let help = "write `or` if one of them is enough; `eventually(a) and eventually(b)` looks at two moments";
             Some((
@@ -148,10 +148,10 @@ fn fault_of(formula: &Formula) -> Option<(Diagnostic, Span)> {
                 span,
             ))
         }
-        Formula::Or(parts) => {
-            let opposites: Vec<Formula> = parts
+        CheckedFormula::Or(parts) => {
+            let opposites: Vec<CheckedFormula> = parts
                 .iter()
-                .map(|part| Formula::Not(Box::new(part.clone())))
+                .map(|part| CheckedFormula::Not(Box::new(part.clone())))
                 .collect();
             let span = exclusive(&opposites)?;
             let help = "write `and` if both must hold";
@@ -160,7 +160,7 @@ fn fault_of(formula: &Formula) -> Option<(Diagnostic, Span)> {
                 span,
             ))
         }
-        Formula::Temporal { from, to, span, .. } => {
+        CheckedFormula::Temporal { from, to, span, .. } => {
             let first = (from * SAMPLES_PER_SEC - ROUNDING).ceil();
             let last = (to * SAMPLES_PER_SEC + ROUNDING).floor();
             let help = "a course has 60 samples a second: write an interval that includes one of them, such as `[0, 0.1]`";
@@ -172,7 +172,9 @@ fn fault_of(formula: &Formula) -> Option<(Diagnostic, Span)> {
                 )
             })
         }
-        Formula::Truth { .. } | Formula::Not(_) | Formula::Consequent { .. } => None,
+        CheckedFormula::Truth { .. }
+        | CheckedFormula::Not(_)
+        | CheckedFormula::Consequent { .. } => None,
     }
 }
 
@@ -186,7 +188,7 @@ fn verdict(holds: bool, why: &str) -> Diagnostic {
 }
 
 /// Returns whether a comparison has the same outcome at every moment of every action.
-fn constant(formula: &Formula) -> Option<bool> {
+fn constant(formula: &CheckedFormula) -> Option<bool> {
     let mut left = Left::default();
     let (quantity, op, number) = compared(formula)?;
     if let Quantity::Recorded { iri, .. } = quantity
@@ -207,20 +209,20 @@ fn constant(formula: &Formula) -> Option<bool> {
 }
 
 /// Returns the quantity, operator and number of a comparison with a number.
-fn compared(formula: &Formula) -> Option<(&Quantity, Comparison, f64)> {
+fn compared(formula: &CheckedFormula) -> Option<(&Quantity, Comparison, f64)> {
     match formula {
-        Formula::Compare {
+        CheckedFormula::Compare {
             left: Quantity::Number(_),
             right: Quantity::Number(_),
             ..
         } => None,
-        Formula::Compare {
+        CheckedFormula::Compare {
             op,
             left,
             right: Quantity::Number(number),
             ..
         } => Some((left, *op, *number)),
-        Formula::Compare {
+        CheckedFormula::Compare {
             op,
             left: Quantity::Number(number),
             right,
@@ -231,7 +233,7 @@ fn compared(formula: &Formula) -> Option<(&Quantity, Comparison, f64)> {
 }
 
 /// Returns the place of a condition that excludes others of the same moment.
-fn exclusive(parts: &[Formula]) -> Option<Span> {
+fn exclusive(parts: &[CheckedFormula]) -> Option<Span> {
     let mut left: BTreeMap<String, Left> = BTreeMap::new();
     let mut flat = Vec::new();
     parts
@@ -239,8 +241,8 @@ fn exclusive(parts: &[Formula]) -> Option<Span> {
         .for_each(|part| conjuncts(part, false, &mut flat));
     for (part, negated) in flat {
         let (key, op, number, span) = match part {
-            Formula::Truth { quantity, span } => (quantity, Comparison::Equal, 1.0, span),
-            Formula::Compare { span, .. } => {
+            CheckedFormula::Truth { quantity, span } => (quantity, Comparison::Equal, 1.0, span),
+            CheckedFormula::Compare { span, .. } => {
                 let (quantity, op, number) = compared(part)?;
                 (quantity, op, number, span)
             }
@@ -257,18 +259,24 @@ fn exclusive(parts: &[Formula]) -> Option<Span> {
 
 /// Appends the comparisons and truths that must all hold for a formula, each with whether it is
 /// negated.
-fn conjuncts<'f>(formula: &'f Formula, negated: bool, found: &mut Vec<(&'f Formula, bool)>) {
+fn conjuncts<'f>(
+    formula: &'f CheckedFormula,
+    negated: bool,
+    found: &mut Vec<(&'f CheckedFormula, bool)>,
+) {
     match formula {
-        Formula::Not(inner) => conjuncts(inner, !negated, found),
-        Formula::Consequent { formula, .. } => conjuncts(formula, negated, found),
-        Formula::And(parts) if !negated => parts
+        CheckedFormula::Not(inner) => conjuncts(inner, !negated, found),
+        CheckedFormula::Consequent { formula, .. } => conjuncts(formula, negated, found),
+        CheckedFormula::And(parts) if !negated => parts
             .iter()
             .for_each(|part| conjuncts(part, negated, found)),
-        Formula::Or(parts) if negated => parts
+        CheckedFormula::Or(parts) if negated => parts
             .iter()
             .for_each(|part| conjuncts(part, negated, found)),
-        Formula::Compare { .. } if compared(formula).is_none() => {}
-        Formula::Compare { .. } | Formula::Truth { .. } => found.push((formula, negated)),
+        CheckedFormula::Compare { .. } if compared(formula).is_none() => {}
+        CheckedFormula::Compare { .. } | CheckedFormula::Truth { .. } => {
+            found.push((formula, negated))
+        }
         _ => {}
     }
 }

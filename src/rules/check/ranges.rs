@@ -8,7 +8,7 @@ use crate::check::left::Left;
 use crate::model::expression::{Expr, Variable};
 use crate::model::program::{Atom, Literal, Operand, Predicates, Rule};
 use crate::syntax::Comparison;
-use crate::temporal::Formula;
+use crate::temporal::CheckedFormula;
 use actcheck_base::{Diagnostic, Diagnostics, Span, Term, TermId, Terms, names};
 use actcheck_ontology::Ontology;
 
@@ -170,7 +170,7 @@ fn numbers_of_formulas(
 ) {
     for formula in formulas(rule) {
         formula.visit(&mut |part| {
-            let Formula::Compare { left, right, span, .. } = part else { return };
+            let CheckedFormula::Compare { left, right, span, .. } = part else { return };
             let mut variables = Vec::new();
             [left, right].into_iter().for_each(|side| side.numbers(&mut variables));
             for variable in variables {

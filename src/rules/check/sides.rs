@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::model::expression::{Expr, Variable};
 use crate::model::given::VERDICT;
 use crate::model::program::{
-    Atom, Literal, Operand, PredicateId, Predicates, Program, Rule, Scope,
+    Atom, CheckedProgram, Literal, Operand, PredicateId, Predicates, Rule, Scope,
 };
 use actcheck_base::{Diagnostic, Term, Terms, names};
 
@@ -62,7 +62,7 @@ impl<'a> Sides<'a> {
     /// `library`: the rules of the libraries. Returns `None` if no rule or query can read a side by
     /// its name.
     pub(crate) fn new(
-        library: &'a Program,
+        library: &'a CheckedProgram,
         predicates: &'a Predicates,
         terms: &Terms,
     ) -> Option<Self> {
@@ -92,7 +92,7 @@ impl<'a> Sides<'a> {
         (!sides.other.is_empty()).then_some(sides)
     }
 
-    fn add(&mut self, program: &'a Program) {
+    fn add(&mut self, program: &'a CheckedProgram) {
         for rule in &program.rules {
             self.rules
                 .entry(rule.head.predicate)
@@ -103,7 +103,11 @@ impl<'a> Sides<'a> {
     }
 
     /// The warning about a property whose outcome or margin changes if all sides are exchanged.
-    pub(crate) fn one_sided(&self, program: &'a Program, scope: Scope) -> Option<Diagnostic> {
+    pub(crate) fn one_sided(
+        &self,
+        program: &'a CheckedProgram,
+        scope: Scope,
+    ) -> Option<Diagnostic> {
         let mut below = Self {
             rules: self.rules.clone(),
             with_facts: self.with_facts.clone(),

@@ -6,12 +6,12 @@ use crate::check::checking::{Role, counted};
 use crate::check::expressions::operator;
 use crate::check::translate::Translation;
 use crate::syntax::{self, Expression, ExpressionKind, FormulaKind};
-use crate::temporal::{Formula, Quantity, Thing, known_quantity, quantity_names};
+use crate::temporal::{CheckedFormula, Quantity, Thing, known_quantity, quantity_names};
 use actcheck_base::{Span, Term, did_you_mean, names};
 
 impl Translation<'_, '_> {
     /// Translates a formula. Returns `None` if an error was reported.
-    pub(super) fn formula(&mut self, formula: &syntax::Formula) -> Option<Formula> {
+    pub(super) fn formula(&mut self, formula: &syntax::Formula) -> Option<CheckedFormula> {
         if self.role == Role::Standalone {
             let help = "write it in a property or in a rule library: a program on its own has no course of an action";
             self.error(
@@ -25,12 +25,12 @@ impl Translation<'_, '_> {
         self.checked(formula)
     }
 
-    fn checked(&mut self, formula: &syntax::Formula) -> Option<Formula> {
+    fn checked(&mut self, formula: &syntax::Formula) -> Option<CheckedFormula> {
         let span = formula.span.clone();
         Some(match &formula.kind {
             FormulaKind::Compare(op, left, right) => {
                 let (left, right) = (self.quantity(left), self.quantity(right));
-                Formula::Compare {
+                CheckedFormula::Compare {
                     op: *op,
                     left: left?,
                     right: right?,
@@ -44,18 +44,18 @@ impl Translation<'_, '_> {
                     self.error("R051", &span, "this is a number, not a condition", help);
                     return None;
                 }
-                Formula::Truth { quantity, span }
+                CheckedFormula::Truth { quantity, span }
             }
-            FormulaKind::Not(inner) => Formula::Not(Box::new(self.checked(inner)?)),
-            FormulaKind::And(parts) => Formula::And(self.all_checked(parts)?),
-            FormulaKind::Or(parts) => Formula::Or(self.all_checked(parts)?),
+            FormulaKind::Not(inner) => CheckedFormula::Not(Box::new(self.checked(inner)?)),
+            FormulaKind::And(parts) => CheckedFormula::And(self.all_checked(parts)?),
+            FormulaKind::Or(parts) => CheckedFormula::Or(self.all_checked(parts)?),
             FormulaKind::Implies(left, right) => {
                 let (left, right) = (self.checked(left), self.checked(right));
-                let consequent = Formula::Consequent {
+                let consequent = CheckedFormula::Consequent {
                     formula: Box::new(right?),
                     needed: false,
                 };
-                Formula::Or(vec![Formula::Not(Box::new(left?)), consequent])
+                CheckedFormula::Or(vec![CheckedFormula::Not(Box::new(left?)), consequent])
             }
             FormulaKind::Temporal {
                 operator,
@@ -65,7 +65,7 @@ impl Translation<'_, '_> {
                 let interval = self.interval(bound.as_ref(), operator.name());
                 let parts = self.all_checked(parts);
                 let (from, to) = interval?;
-                Formula::Temporal {
+                CheckedFormula::Temporal {
                     operator: *operator,
                     from,
                     to,
@@ -76,8 +76,9 @@ impl Translation<'_, '_> {
         })
     }
 
-    fn all_checked(&mut self, parts: &[syntax::Formula]) -> Option<Vec<Formula>> {
-        let parts: Vec<Option<Formula>> = parts.iter().map(|part| self.checked(part)).collect();
+    fn all_checked(&mut self, parts: &[syntax::Formula]) -> Option<Vec<CheckedFormula>> {
+        let parts: Vec<Option<CheckedFormula>> =
+            parts.iter().map(|part| self.checked(part)).collect();
         parts.into_iter().collect()
     }
 

@@ -23,7 +23,7 @@ type Position = (PredicateId, usize);
 type Reach = BTreeMap<Position, Option<Position>>;
 
 /// A rule that makes new things.
-struct Maker<'r> {
+struct MakingRule<'r> {
     rule: &'r Rule,
     /// The predicate of its matches.
     entrance: PredicateId,
@@ -45,7 +45,7 @@ pub(crate) fn endless(rules: &[Rule]) -> Vec<Endless<'_>> {
         return Vec::new();
     }
     let moves = Moves::new(rules);
-    let makers: Vec<Maker<'_>> = rules
+    let makers: Vec<MakingRule<'_>> = rules
         .iter()
         .filter_map(|rule| maker(rule, &rule.makes()?.new, &moves))
         .collect();
@@ -257,7 +257,7 @@ fn inputs(value: &Expr) -> Vec<Variable> {
     variables
 }
 
-fn maker<'r>(rule: &'r Rule, new: &[Variable], moves: &Moves) -> Option<Maker<'r>> {
+fn maker<'r>(rule: &'r Rule, new: &[Variable], moves: &Moves) -> Option<MakingRule<'r>> {
     let own = positions(&rule.head);
     let start = |variable| {
         own.iter()
@@ -270,7 +270,7 @@ fn maker<'r>(rule: &'r Rule, new: &[Variable], moves: &Moves) -> Option<Maker<'r
         .map(|variable| (*variable, moves.reach(start(*variable))))
         .collect();
     let entrance = rule.body.iter().find_map(Literal::atom)?.predicate;
-    Some(Maker {
+    Some(MakingRule {
         rule,
         entrance,
         new,

@@ -11,7 +11,7 @@ use crate::check::safety;
 use crate::engine::budget::Budget;
 use crate::model::expression::{Expr, Variable};
 use crate::model::program::{
-    Aggregation, Atom, Literal, Operand, Origin, PredicateId, Program, Rule,
+    Aggregation, Atom, CheckedProgram, Literal, Operand, Origin, PredicateId, Rule,
 };
 use crate::model::universe::Universe;
 use crate::syntax::limits::{FAULT_LIMIT, LITERAL_LIMIT, VARIABLE_LIMIT};
@@ -24,8 +24,12 @@ use crate::watch::Watch;
 use actcheck_base::{Source, Span, Term, TermId, Terms};
 
 /// Translates the rules and facts of a file. Statements with errors are reported and left out.
-pub(crate) fn translate(checking: &mut Checking<'_>, syntax: &Syntax, role: Role) -> Program {
-    let mut program = Program::default();
+pub(crate) fn translate(
+    checking: &mut Checking<'_>,
+    syntax: &Syntax,
+    role: Role,
+) -> CheckedProgram {
+    let mut program = CheckedProgram::default();
     let globals = globals(checking, syntax, role);
     let before = checking.errors;
     for statement in &syntax.statements {

@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::model::given::Phases;
 use crate::model::program::{
-    Atom, Literal, Operand, PredicateId, Predicates, Program, Rule, Scope,
+    Atom, CheckedProgram, Literal, Operand, PredicateId, Predicates, Rule, Scope,
 };
 use actcheck_base::{CONSTANT_PROPERTIES, Diagnostic, Source, Span, TermId, Terms, names};
 use actcheck_ontology::{Ontology, Property};
@@ -62,7 +62,7 @@ type Read = (PredicateId, bool);
 
 impl<'a> Reads<'a> {
     pub(crate) fn new(
-        library: &'a Program,
+        library: &'a CheckedProgram,
         predicates: &'a Predicates,
         phases: Phases,
         terms: &Terms,
@@ -90,7 +90,7 @@ impl<'a> Reads<'a> {
         reads
     }
 
-    fn add(&mut self, program: &'a Program) {
+    fn add(&mut self, program: &'a CheckedProgram) {
         for rule in &program.rules {
             self.rules
                 .entry(rule.head.predicate)
@@ -101,7 +101,11 @@ impl<'a> Reads<'a> {
 
     /// The first rule of a property's verdict, if no rule of it reads a fact that an action can
     /// change.
-    pub(crate) fn unchanging(mut self, program: &'a Program, scope: Scope) -> Option<&'a Rule> {
+    pub(crate) fn unchanging(
+        mut self,
+        program: &'a CheckedProgram,
+        scope: Scope,
+    ) -> Option<&'a Rule> {
         self.add(program);
         let verdict = ["success", "violation", "applicable"];
         let verdict: Vec<PredicateId> = verdict

@@ -6,7 +6,7 @@ use std::collections::{BTreeSet, HashMap};
 use crate::model::expression::Expr;
 use crate::model::program::{Atom, Literal, Operand, PredicateId, Predicates, Rule};
 use crate::syntax::Comparison;
-use crate::temporal::{Formula, Quantity};
+use crate::temporal::{CheckedFormula, Quantity};
 use actcheck_base::{Diagnostic, Diagnostics, Span, Term, Terms};
 use actcheck_ontology::Vocabulary;
 
@@ -425,9 +425,9 @@ impl Seen<'_> {
     }
 
     /// Checks the comparisons of a formula and appends the unit of each.
-    fn formula(&mut self, formula: &Formula, found: &mut Vec<Unit>) {
+    fn formula(&mut self, formula: &CheckedFormula, found: &mut Vec<Unit>) {
         match formula {
-            Formula::Compare {
+            CheckedFormula::Compare {
                 left, right, span, ..
             } => {
                 let (a, b) = (self.quantity(left, span), self.quantity(right, span));
@@ -440,11 +440,13 @@ impl Seen<'_> {
                     }
                 }
             }
-            Formula::Truth { .. } => {}
-            Formula::Not(inner) | Formula::Consequent { formula: inner, .. } => {
+            CheckedFormula::Truth { .. } => {}
+            CheckedFormula::Not(inner) | CheckedFormula::Consequent { formula: inner, .. } => {
                 self.formula(inner, found)
             }
-            Formula::And(parts) | Formula::Or(parts) | Formula::Temporal { parts, .. } => {
+            CheckedFormula::And(parts)
+            | CheckedFormula::Or(parts)
+            | CheckedFormula::Temporal { parts, .. } => {
                 parts.iter().for_each(|part| self.formula(part, found));
             }
         }

@@ -12,7 +12,7 @@ use crate::engine::meter::{Meter, Stop};
 use crate::engine::plan::{Indexes, Op, Part, Parts, RulePlan, Scan, Sizes, Variant, plan_rule};
 use crate::engine::relation::{Finished, Growing, finished, growing};
 use crate::engine::variant::{Adapted, Context, allowance, attempt, replanned};
-use crate::model::program::{PredicateId, Predicates, Program, Rule};
+use crate::model::program::{CheckedProgram, PredicateId, Predicates, Rule};
 use crate::model::universe::Universe;
 use actcheck_base::{RuleFault, TermId};
 
@@ -87,7 +87,7 @@ pub(crate) struct Planned {
 impl Planned {
     /// Plans every rule of a stratified program.
     pub(crate) fn new(
-        program: Program,
+        program: CheckedProgram,
         strata: Vec<Stratum>,
         indexes: &mut Indexes,
         sizes: Sizes<'_>,

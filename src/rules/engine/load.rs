@@ -6,7 +6,7 @@ use crate::engine::evaluate::Tables;
 use crate::engine::plan::Indexes;
 use crate::engine::relation::finished;
 use crate::model::given::Phases;
-use crate::model::program::{Literal, Operand, PredicateId, Predicates, Program};
+use crate::model::program::{CheckedProgram, Literal, Operand, PredicateId, Predicates};
 use crate::model::universe::Universe;
 use crate::temporal::{things_of, values_of};
 use actcheck_base::{ActionFacts, Course, Term, TermId, Triple};
@@ -82,7 +82,7 @@ impl Given {
     }
 
     /// Restricts the samples that are loaded to those of the things that these rules read.
-    pub(crate) fn restrict_course(&mut self, programs: &[&Program]) {
+    pub(crate) fn restrict_course(&mut self, programs: &[&CheckedProgram]) {
         let rules = || programs.iter().flat_map(|program| &program.rules);
         for reader in self.course.values_mut() {
             let atoms = rules()

@@ -107,7 +107,7 @@ impl Meter {
 }
 
 /// The noun for the things of rules with `!x` in their heads, in messages.
-pub(crate) const NEW_THINGS: &str = "new things (`!x`)";
+const NEW_THINGS: &str = "new things (`!x`)";
 
 /// Formats an amount of memory.
 pub(crate) fn mebibytes(bytes: usize) -> String {

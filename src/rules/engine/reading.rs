@@ -1,7 +1,7 @@
 //! Reads a property's findings from the tuples of its rules.
 
 use crate::engine::evaluate::Layers;
-use crate::model::program::{PredicateId, Predicates, Program};
+use crate::model::program::{CheckedProgram, PredicateId, Predicates};
 use crate::model::universe::Universe;
 use crate::model::values::{Number, lexical};
 use actcheck_base::{Findings, RuleFault, Term, WitnessRow};
@@ -29,7 +29,7 @@ pub(crate) struct Decisive {
 }
 
 impl Verdict {
-    pub(crate) fn new(program: &Program, predicates: &Predicates, scope: usize) -> Self {
+    pub(crate) fn new(program: &CheckedProgram, predicates: &Predicates, scope: usize) -> Self {
         let find = |name: &str| predicates.find(scope, name, None);
         let decisive = [("success", true), ("violation", false)]
             .into_iter()

@@ -123,12 +123,12 @@ impl<const W: usize> Finished for FinishedOf<W> {
 
 /// One column order of growing tuples: a datafrog variable with its own iteration, so that all
 /// orders of a predicate advance from round to round together.
-struct Grown<const W: usize> {
+struct GrowingOrder<const W: usize> {
     iteration: Iteration,
     variable: Variable<[TermId; W]>,
 }
 
-impl<const W: usize> Grown<W> {
+impl<const W: usize> GrowingOrder<W> {
     fn new() -> Self {
         let mut iteration = Iteration::new();
         // Only new rows are inserted, so that no duplicates have to be removed.
@@ -142,8 +142,8 @@ impl<const W: usize> Grown<W> {
 
 struct GrowingOf<const W: usize> {
     orders: Arc<Vec<Order>>,
-    indexes: Vec<Option<Grown<W>>>,
-    primary: Grown<W>,
+    indexes: Vec<Option<GrowingOrder<W>>>,
+    primary: GrowingOrder<W>,
     /// New rows of this round, sorted.
     added: RefCell<Vec<TermId>>,
 }
@@ -153,12 +153,12 @@ impl<const W: usize> GrowingOf<W> {
     fn new(orders: Arc<Vec<Order>>, wanted: &[bool]) -> Self {
         let indexes = wanted
             .iter()
-            .map(|wanted| wanted.then(Grown::new))
+            .map(|wanted| wanted.then(GrowingOrder::new))
             .collect();
         Self {
             orders,
             indexes,
-            primary: Grown::new(),
+            primary: GrowingOrder::new(),
             added: RefCell::default(),
         }
     }
@@ -209,7 +209,7 @@ impl<const W: usize> Growing for GrowingOf<W> {
 
     fn add_index(&mut self, index: usize, orders: &Arc<Vec<Order>>) -> usize {
         self.orders = Arc::clone(orders);
-        let mut grown = Grown::new();
+        let mut grown = GrowingOrder::new();
         let order = &orders[index];
         let mut count = 0;
         for batch in self.primary.variable.stable.borrow().iter() {

@@ -51,14 +51,14 @@ struct Drawn {
     binding: Vec<TermId>,
     /// Number of bindings that it represents.
     weight: f64,
-    /// The binding of the search that it belongs to, by its place in [`Search::origins`].
+    /// The binding of the search that it belongs to, by its place in [`MatchSearch::origins`].
     origin: usize,
 }
 
 /// The atoms after those that bind the head's variables: the evaluation searches one match of them
 /// for each binding.
 #[derive(Debug, Clone, Default)]
-struct Search {
+struct MatchSearch {
     /// Cost of the atoms before. Unit: rows read.
     before: f64,
     /// For each binding before, the number of bindings that it represents, and the cost to find all
@@ -66,7 +66,7 @@ struct Search {
     origins: Vec<(f64, f64)>,
 }
 
-impl Search {
+impl MatchSearch {
     /// Begins a search for each binding of a sample, which is reduced.
     fn begin(partial: &mut Partial) -> Self {
         partial.sample = thinned(std::mem::take(&mut partial.sample), ORIGINS);
@@ -111,7 +111,7 @@ struct Partial {
     /// The atoms that are looked up by a computed value.
     keyed: BTreeSet<usize>,
     /// The search for one match, if it has begun.
-    search: Option<Search>,
+    search: Option<MatchSearch>,
     /// Estimated number of bindings.
     count: f64,
     /// Estimated number of rows read.
@@ -200,7 +200,7 @@ impl Sampler<'_, '_, '_> {
             && !partial.sample.is_empty()
             && self.outputs_are_bound(partial, group)
         {
-            next.search = Some(Search::begin(&mut next));
+            next.search = Some(MatchSearch::begin(&mut next));
         }
         let mut search = next.search.take();
         let mut count = |drawn: &Drawn, rows_read: f64| {

@@ -271,7 +271,7 @@ pub(crate) struct Making {
 
 /// The checked rules and facts of one file, or of several that belong together.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Program {
+pub(crate) struct CheckedProgram {
     pub(crate) rules: Vec<Rule>,
     /// Facts from the text or from imported files, as rows stored one after another.
     pub(crate) facts: BTreeMap<PredicateId, Vec<TermId>>,

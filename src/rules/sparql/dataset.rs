@@ -110,13 +110,13 @@ pub(crate) struct View<'a> {
 /// A term held by the evaluator. Copying it may stop the evaluation.
 #[derive(Debug, Clone)]
 pub(crate) struct ViewTerm<'a> {
-    value: Value<'a>,
+    value: DatasetTerm<'a>,
     _entry: Entry<'a>,
 }
 
 /// A term of the dataset by id, or a term created by the query.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-enum Value<'a> {
+enum DatasetTerm<'a> {
     Known(TermId),
     Created(Rc<Created<'a>>),
 }
@@ -146,8 +146,8 @@ impl ViewTerm<'_> {
     /// Returns the id, or `None` for a term created by the query, which matches no statement.
     fn id(&self) -> Option<TermId> {
         match self.value {
-            Value::Known(id) => Some(id),
-            Value::Created(_) => None,
+            DatasetTerm::Known(id) => Some(id),
+            DatasetTerm::Created(_) => None,
         }
     }
 }
@@ -176,7 +176,7 @@ impl<'a> View<'a> {
             .chain([(statements.name, &statements.graph)])
     }
 
-    fn handed_out(&self, value: Value<'a>) -> ViewTerm<'a> {
+    fn handed_out(&self, value: DatasetTerm<'a>) -> ViewTerm<'a> {
         ViewTerm {
             value,
             _entry: Entry::new(self.ledger),
@@ -219,7 +219,7 @@ impl<'a> QueryableDataset<'a> for View<'a> {
         }
         let view = *self;
         found.into_iter().map(move |(triple, graph)| {
-            let known = |id| view.handed_out(Value::Known(id));
+            let known = |id| view.handed_out(DatasetTerm::Known(id));
             let [subject, predicate, object] = triple.map(known);
             Ok(InternalQuad {
                 subject,
@@ -235,7 +235,7 @@ impl<'a> QueryableDataset<'a> for View<'a> {
     ) -> impl Iterator<Item = Result<ViewTerm<'a>, Infallible>> + use<'a> {
         let view = *self;
         view.graphs()
-            .map(move |(name, _)| Ok(view.handed_out(Value::Known(name))))
+            .map(move |(name, _)| Ok(view.handed_out(DatasetTerm::Known(name))))
     }
 
     fn contains_internal_graph_name(&self, graph_name: &ViewTerm<'a>) -> Result<bool, Infallible> {
@@ -244,20 +244,20 @@ impl<'a> QueryableDataset<'a> for View<'a> {
 
     fn internalize_term(&self, term: RdfTerm) -> Result<ViewTerm<'a>, Infallible> {
         if let Some(known) = self.universe.id(&from_rdf(&term)) {
-            return Ok(self.handed_out(Value::Known(known)));
+            return Ok(self.handed_out(DatasetTerm::Known(known)));
         }
         let weight = Weight::new(self.ledger, length_of(&term));
         let created = Created {
             term,
             _weight: weight,
         };
-        Ok(self.handed_out(Value::Created(Rc::new(created))))
+        Ok(self.handed_out(DatasetTerm::Created(Rc::new(created))))
     }
 
     fn externalize_term(&self, term: ViewTerm<'a>) -> Result<RdfTerm, Infallible> {
         Ok(match term.value {
-            Value::Known(id) => to_rdf(self.universe.term(id)),
-            Value::Created(created) => created.term.clone(),
+            DatasetTerm::Known(id) => to_rdf(self.universe.term(id)),
+            DatasetTerm::Created(created) => created.term.clone(),
         })
     }
 }

@@ -96,7 +96,7 @@ impl Query {
         diagnostics.or(Self {
             prepared,
             warnings,
-            asks: form == Some(Form::Ask),
+            asks: form == Some(QueryForm::Ask),
             reads_intervals: named_in(&source.text),
             file: source.name.to_string(),
         })
@@ -301,20 +301,20 @@ fn bind_designators(text: &str, designators: &BTreeSet<String>) -> String {
 
 /// The query forms allowed for properties.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Form {
+enum QueryForm {
     Ask,
     Select,
 }
 
 /// Returns the form of a query, or `None` for any other form.
-fn form(text: &str) -> Option<Form> {
+fn form(text: &str) -> Option<QueryForm> {
     let group = first_group(text)?;
     scan(text)
         .into_iter()
         .take_while(|token| token.span.start < group)
         .find_map(|token| match token.word.to_ascii_lowercase().as_str() {
-            "ask" => Some(Form::Ask),
-            "select" => Some(Form::Select),
+            "ask" => Some(QueryForm::Ask),
+            "select" => Some(QueryForm::Select),
             _ => None,
         })
 }

@@ -27,14 +27,14 @@ pub(crate) fn is_unchanging(text: &str) -> bool {
                 dataset: None,
                 ..
             },
-        ) => !changes(&pattern, Graph::All),
+        ) => !changes(&pattern, ReadGraph::All),
         _ => false,
     }
 }
 
 /// The graph whose facts a pattern reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Graph {
+enum ReadGraph {
     /// All graphs together.
     All,
     /// The state after the action, in which only constant properties are unchanging.
@@ -45,7 +45,7 @@ enum Graph {
     Other,
 }
 
-impl Graph {
+impl ReadGraph {
     fn named(name: &NamedNodePattern) -> Self {
         let NamedNodePattern::NamedNode(node) = name else {
             return Self::Other;
@@ -59,7 +59,7 @@ impl Graph {
 }
 
 /// Whether a pattern may read a fact that an action can change.
-fn changes(pattern: &GraphPattern, graph: Graph) -> bool {
+fn changes(pattern: &GraphPattern, graph: ReadGraph) -> bool {
     let of = |inner: &GraphPattern| changes(inner, graph);
     let by = |expression: &Expression| decides(expression, graph);
     match pattern {
@@ -69,19 +69,19 @@ fn changes(pattern: &GraphPattern, graph: Graph) -> bool {
                 NamedNodePattern::Variable(_) => false,
             };
             match graph {
-                Graph::Unchanging => false,
-                Graph::After => !patterns.iter().all(constant),
-                Graph::All | Graph::Other => !patterns.is_empty(),
+                ReadGraph::Unchanging => false,
+                ReadGraph::After => !patterns.iter().all(constant),
+                ReadGraph::All | ReadGraph::Other => !patterns.is_empty(),
             }
         }
         GraphPattern::Path { path, .. } => match graph {
-            Graph::Unchanging => false,
-            Graph::After => {
+            ReadGraph::Unchanging => false,
+            ReadGraph::After => {
                 !matches!(path, PropertyPathExpression::NamedNode(node) if is_constant(node.as_str()))
             }
-            Graph::All | Graph::Other => true,
+            ReadGraph::All | ReadGraph::Other => true,
         },
-        GraphPattern::Graph { name, inner } => changes(inner, Graph::named(name)),
+        GraphPattern::Graph { name, inner } => changes(inner, ReadGraph::named(name)),
         GraphPattern::Join { left, right }
         | GraphPattern::Union { left, right }
         | GraphPattern::Minus { left, right } => of(left) || of(right),
@@ -119,7 +119,7 @@ fn changes(pattern: &GraphPattern, graph: Graph) -> bool {
 }
 
 /// Whether an expression may read a fact that an action can change: it may contain `EXISTS`.
-fn decides(expression: &Expression, graph: Graph) -> bool {
+fn decides(expression: &Expression, graph: ReadGraph) -> bool {
     match expression {
         Expression::Exists(pattern) => changes(pattern, graph),
         _ => parts(expression)

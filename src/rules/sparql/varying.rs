@@ -35,9 +35,9 @@ pub(crate) fn varying(source: &Source) -> Option<Diagnostic> {
 }
 
 /// A function with the remedy.
-type Found = (&'static str, &'static str);
+type VaryingFunction = (&'static str, &'static str);
 
-fn name(function: &Function) -> Option<Found> {
+fn name(function: &Function) -> Option<VaryingFunction> {
     const CHANCE: &str =
         "compare a fact of the run; the campaign's seed makes everything else that is random";
     const THING: &str =
@@ -55,7 +55,7 @@ fn name(function: &Function) -> Option<Found> {
     }
 }
 
-fn in_pattern(pattern: &GraphPattern) -> Option<Found> {
+fn in_pattern(pattern: &GraphPattern) -> Option<VaryingFunction> {
     match pattern {
         GraphPattern::Join { left, right }
         | GraphPattern::Union { left, right }
@@ -96,7 +96,7 @@ fn in_pattern(pattern: &GraphPattern) -> Option<Found> {
     }
 }
 
-fn in_expression(expression: &Expression) -> Option<Found> {
+fn in_expression(expression: &Expression) -> Option<VaryingFunction> {
     let own = match expression {
         Expression::Exists(pattern) => in_pattern(pattern),
         Expression::FunctionCall(function, _) => name(function),

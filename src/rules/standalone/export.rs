@@ -31,13 +31,13 @@ const RDF_OPTIONS: [&str; 3] = ["resource", "compression", "limit"];
 pub(super) struct Export {
     pub(super) predicate: String,
     pub(super) path: PathBuf,
-    content: Content,
+    content: ExportFormat,
     compression: Compression,
     limit: usize,
 }
 
 #[derive(Debug, PartialEq, Eq)]
-enum Content {
+enum ExportFormat {
     /// `columns`: the stated ones.
     Table {
         delimiter: u8,
@@ -88,7 +88,7 @@ pub(super) fn exports(program: &Program, diagnostics: &mut Diagnostics) -> Vec<E
 
 fn output(syntax: &Syntax, predicate: &str) -> Export {
     let path = PathBuf::from(format!("{}.csv", file_name(syntax, predicate)));
-    let content = Content::Table {
+    let content = ExportFormat::Table {
         delimiter: b',',
         columns: None,
     };
@@ -150,7 +150,7 @@ fn export(program: &Program, transfer: &Transfer, diagnostics: &mut Diagnostics)
                     "export subject, predicate and object; first the graph for quads",
                 );
             }
-            Content::Rdf(rdf)
+            ExportFormat::Rdf(rdf)
         }
         None if is_table => {
             let delimiter = settings.delimiter();
@@ -171,7 +171,7 @@ fn export(program: &Program, transfer: &Transfer, diagnostics: &mut Diagnostics)
                     "write one word for each column",
                 );
             }
-            Content::Table { delimiter, columns }
+            ExportFormat::Table { delimiter, columns }
         }
         None => {
             let message = "the RDF format of the export is unknown".to_owned();
@@ -268,12 +268,9 @@ pub(super) fn write(
     folder: &Path,
     closure: &Closure,
     stop: &AtomicBool,
-) -> Result<Written, String> {
+) -> std::io::Result<Written> {
     let (path, below) = (folder.join(&export.path), Below::new(folder));
-    let lower = |error: std::io::Error| error.to_string().to_lowercase();
-    below
-        .create_folder(path.parent().unwrap_or(folder))
-        .map_err(lower)?;
+    below.create_folder(path.parent().unwrap_or(folder))?;
     let mut rows: Vec<&[TermId]> = closure.rows_unsorted(&export.predicate).collect();
     rows.sort_unstable_by(|a, b| {
         a.iter()
@@ -292,18 +289,18 @@ pub(super) fn write(
             Ok(row)
         }
     });
-    let new = below.new_file(&path).map_err(lower)?;
-    let mut packed = Packed::new(new.writer().map_err(lower)?, export.compression);
+    let new = below.new_file(&path)?;
+    let mut packed = Packed::new(new.writer()?, export.compression);
     let written = match &export.content {
-        Content::Table { delimiter, columns } => {
+        ExportFormat::Table { delimiter, columns } => {
             let columns = columns.as_deref();
             table(rows, export.limit, *delimiter, columns, packed.writer())
         }
-        Content::Rdf(format) => statements(rows, export.limit, *format, packed.writer()),
+        ExportFormat::Rdf(format) => statements(rows, export.limit, *format, packed.writer()),
     };
-    let written = written.map_err(lower)?;
-    packed.finish().map_err(lower)?;
-    new.finish().map_err(lower)?;
+    let written = written?;
+    packed.finish()?;
+    new.finish()?;
     Ok(written)
 }
 

@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use oxrdfio::{RdfFormat, RdfParser};
 
 use crate::check::checking::{Checking, Role, counted};
-use crate::model::program::{Predicates, Program};
+use crate::model::program::{CheckedProgram, Predicates};
 use crate::standalone::faults::Faults;
-use crate::standalone::input::{Compression, Ended, Limits, open};
+use crate::standalone::input::{Compression, Ended, InputFault, Limits, open};
 use crate::standalone::json::read_json;
-use crate::standalone::records::{Found, Records};
+use crate::standalone::records::{Records, RowRead};
 use crate::standalone::settings::Settings;
-use crate::standalone::sink::Sink;
+use crate::standalone::sink::ImportSink;
 use crate::standalone::statements::read_rdf;
 use crate::standalone::table::{ColumnKind, Layout, read_table};
 use crate::syntax::{LiteralSyntax, Statement, Syntax, Transfer};
@@ -44,12 +44,12 @@ pub(super) struct Import {
     arity: usize,
     path: PathBuf,
     compression: Compression,
-    content: Content,
+    content: ImportFormat,
     limit: usize,
 }
 
 #[derive(Debug)]
-enum Content {
+enum ImportFormat {
     Table(Layout),
     Rdf {
         format: RdfFormat,
@@ -149,7 +149,7 @@ fn import_of(
             settings,
             (&path, compression, limits),
         )?,
-        "json" => (Content::Json, 3),
+        "json" => (ImportFormat::Json, 3),
         _ => rdf(checking, source, transfer, settings, &path)?,
     };
     let limit = settings.count("limit").unwrap_or(usize::MAX);
@@ -218,7 +218,7 @@ fn table(
     transfer: &Transfer,
     settings: &mut Settings<'_>,
     (path, compression, limits): (&Path, Compression, &Limits<'_>),
-) -> Option<(Content, usize)> {
+) -> Option<(ImportFormat, usize)> {
     let delimiter = settings.delimiter();
     let (quoting, headers) = (
         settings.flag("quoting").unwrap_or(true),
@@ -249,7 +249,7 @@ fn table(
         .filter(|column| **column != ColumnKind::Skip)
         .count();
     Some((
-        Content::Table(Layout {
+        ImportFormat::Table(Layout {
             delimiter,
             quoting,
             headers,
@@ -267,7 +267,7 @@ fn rdf(
     transfer: &Transfer,
     settings: &mut Settings<'_>,
     path: &Path,
-) -> Option<(Content, usize)> {
+) -> Option<(ImportFormat, usize)> {
     let Some(format) = rdf_format(&transfer.format, path) else {
         let help = "name the format: ntriples, nquads, turtle, trig or rdfxml";
         let message = format!("the RDF format of `{}` is unknown", path.display());
@@ -292,7 +292,7 @@ fn rdf(
         );
         settings.error(&settings.span("base"), message, "write an absolute IRI");
     }
-    Some((Content::Rdf { format, base }, arity))
+    Some((ImportFormat::Rdf { format, base }, arity))
 }
 
 /// Returns the number of arguments of a predicate, or `None` if the program does not use it.
@@ -336,7 +336,7 @@ fn columns_of_file(
     );
     let found = records.next();
     limits.settle();
-    (found.ok()? == Found::Row).then_some(records.len())
+    (found.ok()? == RowRead::Row).then_some(records.len())
 }
 
 pub(super) fn rdf_format(format: &str, path: &Path) -> Option<RdfFormat> {
@@ -365,7 +365,7 @@ pub(super) fn import(
     import: Import,
     predicates: &Predicates,
     terms: &mut Terms,
-    program: &mut Program,
+    program: &mut CheckedProgram,
     limits: &Limits<'_>,
     lenient: bool,
 ) -> Diagnostics {
@@ -390,7 +390,7 @@ pub(super) fn import(
     let others = program.facts.iter().filter(|(other, _)| **other != id);
     let other_bytes = others.map(|(_, rows)| rows.len()).sum::<usize>() * size_of::<TermId>();
     let rows = program.facts.entry(id).or_default();
-    let mut sink = Sink {
+    let mut sink = ImportSink {
         terms,
         rows,
         limits,
@@ -441,18 +441,18 @@ pub(super) fn import(
     }
 }
 
-fn read(import: &Import, sink: &mut Sink<'_>, faults: &mut Faults) -> Result<(), String> {
+fn read(import: &Import, sink: &mut ImportSink<'_>, faults: &mut Faults) -> Result<(), InputFault> {
     let reader = open(&import.path, import.compression, sink.limits)?;
     match &import.content {
-        Content::Table(layout) => read_table(
+        ImportFormat::Table(layout) => read_table(
             sink.limits.counted(reader),
             layout,
             import.limit,
             sink,
             faults,
         ),
-        Content::Json => read_json(reader, import.limit, sink, faults),
-        Content::Rdf { format, base } => read_rdf(
+        ImportFormat::Json => read_json(reader, import.limit, sink, faults),
+        ImportFormat::Rdf { format, base } => read_rdf(
             sink.limits.counted(reader),
             *format,
             base.as_deref(),
@@ -462,7 +462,7 @@ fn read(import: &Import, sink: &mut Sink<'_>, faults: &mut Faults) -> Result<(),
         ),
     }
     .and_then(|()| sink.check())
-    .map_err(|error| error.to_string())
+    .map_err(InputFault::Read)
 }
 
 #[cfg(test)]

@@ -99,6 +99,28 @@ impl<'a> Limits<'a> {
     }
 }
 
+/// Why a file can't be imported.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum InputFault {
+    #[error("it is a folder")]
+    Folder,
+    #[error("it is UTF-16 text; convert it to UTF-8")]
+    Utf16,
+    #[error("it is not UTF-8 text: a zero byte is at its beginning, as in UTF-16 or binary data")]
+    ZeroByte,
+    #[cfg(not(feature = "gzip"))]
+    #[error(
+        "this build can't decompress it; unpack it, or build `actcheck-rules` with the feature `gzip`"
+    )]
+    Compressed,
+    /// It can't be opened.
+    #[error("{}", .0.to_string().to_lowercase())]
+    Open(Error),
+    /// Its content can't be read.
+    #[error("{0}")]
+    Read(Error),
+}
+
 /// How a file is compressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Compression {
@@ -109,20 +131,19 @@ pub(super) enum Compression {
 /// Opens a file as UTF-8 text without a byte order mark. Reads fail once a limit is reached.
 ///
 /// # Errors
-/// The file can't be opened, or it is UTF-16 text.
+/// [`InputFault`] if the file can't be opened, or it is UTF-16 text.
 pub(super) fn open<'a>(
     path: &Path,
     compression: Compression,
     limits: &'a Limits<'a>,
-) -> Result<Box<dyn Read + 'a>, String> {
-    let lower = |error: Error| error.to_string().to_lowercase();
-    let kind = std::fs::metadata(path).map_err(lower)?;
+) -> Result<Box<dyn Read + 'a>, InputFault> {
+    let kind = std::fs::metadata(path).map_err(InputFault::Open)?;
     if kind.is_dir() {
-        return Err("it is a folder".to_owned());
+        return Err(InputFault::Folder);
     }
     let file: Box<dyn Read + 'a> = match kind.is_file() {
-        true => Box::new(File::open(path).map_err(lower)?),
-        false => Box::new(Pipe::open(path.to_owned(), limits)?),
+        true => Box::new(File::open(path).map_err(InputFault::Open)?),
+        false => Box::new(Pipe::open(path.to_owned(), limits).map_err(InputFault::Open)?),
     };
     let file = Limited {
         inner: file,
@@ -139,13 +160,13 @@ pub(super) fn open<'a>(
     text.by_ref()
         .take(3)
         .read_to_end(&mut head)
-        .map_err(lower)?;
+        .map_err(InputFault::Open)?;
     match head.as_slice() {
         [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => {
-            return Err("it is UTF-16 text; convert it to UTF-8".to_owned());
+            return Err(InputFault::Utf16);
         }
         [0, ..] | [_, 0, ..] => {
-            return Err("it is not UTF-8 text: a zero byte is at its beginning, as in UTF-16 or binary data".to_owned());
+            return Err(InputFault::ZeroByte);
         }
         [0xef, 0xbb, 0xbf] => head.clear(),
         _ => {}
@@ -155,14 +176,14 @@ pub(super) fn open<'a>(
 
 /// Decompresses a file.
 #[cfg(feature = "gzip")]
-fn unpacked<'a>(file: impl std::io::BufRead + 'a) -> Result<Box<dyn Read + 'a>, String> {
+fn unpacked<'a>(file: impl std::io::BufRead + 'a) -> Result<Box<dyn Read + 'a>, InputFault> {
     Ok(Box::new(flate2::bufread::MultiGzDecoder::new(file)))
 }
 
 /// Reports that compressed files need the feature `gzip`.
 #[cfg(not(feature = "gzip"))]
-fn unpacked<'a>(_file: impl Read) -> Result<Box<dyn Read + 'a>, String> {
-    Err("this build can't decompress it; unpack it, or build `actcheck-rules` with the feature `gzip`".to_owned())
+fn unpacked<'a>(_file: impl Read) -> Result<Box<dyn Read + 'a>, InputFault> {
+    Err(InputFault::Compressed)
 }
 
 /// A reader that counts the text from which no rows were made.
@@ -217,7 +238,7 @@ struct Pipe<'a> {
 const PIPE_CHECK: Duration = Duration::from_millis(20);
 
 impl<'a> Pipe<'a> {
-    fn open(path: PathBuf, limits: &'a Limits<'a>) -> Result<Self, String> {
+    fn open(path: PathBuf, limits: &'a Limits<'a>) -> std::io::Result<Self> {
         let (sender, chunks) = sync_channel(4);
         let read = move || {
             let mut file = match File::open(path) {
@@ -241,9 +262,7 @@ impl<'a> Pipe<'a> {
                 }
             }
         };
-        std::thread::Builder::new()
-            .spawn(read)
-            .map_err(|error| error.to_string().to_lowercase())?;
+        std::thread::Builder::new().spawn(read)?;
         Ok(Self {
             chunks,
             chunk: Cursor::new(Vec::new()),

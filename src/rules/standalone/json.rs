@@ -10,7 +10,7 @@ use std::io::Read;
 
 use crate::model::values::{double_term, integer};
 use crate::standalone::faults::{Faults, Place};
-use crate::standalone::sink::Sink;
+use crate::standalone::sink::ImportSink;
 use actcheck_base::{Term, TermId, Terms};
 
 /// Maximum nesting of arrays and objects, so that recursion over them is safe.
@@ -26,7 +26,7 @@ const VALUES_PER_CHECK: usize = 4096;
 pub(super) fn read_json(
     mut reader: impl Read,
     limit: usize,
-    sink: &mut Sink<'_>,
+    sink: &mut ImportSink<'_>,
     faults: &mut Faults,
 ) -> std::io::Result<()> {
     let mut bytes = Vec::new();
@@ -49,7 +49,7 @@ pub(super) fn read_json(
             return Ok(());
         }
     };
-    let mut parser = Parser {
+    let mut parser = JsonParser {
         text,
         at: 0,
         depth: 0,
@@ -58,11 +58,11 @@ pub(super) fn read_json(
     };
     match parser.document() {
         Ok(root) => emit(&parser.values, root, limit, parser.sink),
-        Err(Halt::Fault(at, reason)) => {
+        Err(JsonHalt::Fault(at, reason)) => {
             faults.add(place(text, at), || reason);
             Ok(())
         }
-        Err(Halt::Limit(error)) => Err(error),
+        Err(JsonHalt::Limit(error)) => Err(error),
     }
 }
 
@@ -81,7 +81,7 @@ fn place(text: &str, at: usize) -> Place {
 }
 
 /// A value; members and elements are indices of values.
-enum Value {
+enum JsonValue {
     Null,
     Bool(TermId),
     Number(TermId),
@@ -92,23 +92,23 @@ enum Value {
 }
 
 /// Why parsing ended.
-enum Halt {
+enum JsonHalt {
     /// The text is not valid JSON at a byte.
     Fault(usize, String),
     Limit(std::io::Error),
 }
 
-struct Parser<'a, 's, 'l> {
+struct JsonParser<'a, 's, 'l> {
     text: &'a str,
     /// Unit: bytes.
     at: usize,
     depth: usize,
-    values: Vec<Value>,
-    sink: &'s mut Sink<'l>,
+    values: Vec<JsonValue>,
+    sink: &'s mut ImportSink<'l>,
 }
 
-impl Parser<'_, '_, '_> {
-    fn document(&mut self) -> Result<usize, Halt> {
+impl JsonParser<'_, '_, '_> {
+    fn document(&mut self) -> Result<usize, JsonHalt> {
         let root = self.value()?;
         match self.peek() {
             None => Ok(root),
@@ -116,8 +116,8 @@ impl Parser<'_, '_, '_> {
         }
     }
 
-    fn fault<T>(&self, reason: impl Into<String>) -> Result<T, Halt> {
-        Err(Halt::Fault(self.at, reason.into()))
+    fn fault<T>(&self, reason: impl Into<String>) -> Result<T, JsonHalt> {
+        Err(JsonHalt::Fault(self.at, reason.into()))
     }
 
     /// Skips white space and returns the next byte.
@@ -137,19 +137,19 @@ impl Parser<'_, '_, '_> {
     }
 
     /// Adds a value and returns its index.
-    fn add(&mut self, value: Value) -> Result<usize, Halt> {
+    fn add(&mut self, value: JsonValue) -> Result<usize, JsonHalt> {
         self.values.push(value);
         if self.values.len().is_multiple_of(VALUES_PER_CHECK) {
-            let bytes = self.text.len() + self.values.len() * 2 * size_of::<Value>();
+            let bytes = self.text.len() + self.values.len() * 2 * size_of::<JsonValue>();
             let sink = &self.sink;
             sink.limits
                 .check_with(sink.other_bytes + sink.terms.bytes() + bytes)
-                .map_err(Halt::Limit)?;
+                .map_err(JsonHalt::Limit)?;
         }
         Ok(self.values.len() - 1)
     }
 
-    fn value(&mut self) -> Result<usize, Halt> {
+    fn value(&mut self) -> Result<usize, JsonHalt> {
         match self.peek() {
             Some(b'{' | b'[') if self.depth == DEPTH_LIMIT => self.fault(format!(
                 "more than {DEPTH_LIMIT} arrays and objects in each other"
@@ -159,14 +159,17 @@ impl Parser<'_, '_, '_> {
             Some(b'"') => {
                 let text = self.string()?;
                 let id = self.sink.terms.intern_string(&text);
-                self.add(Value::Text(id))
+                self.add(JsonValue::Text(id))
             }
             Some(b'-' | b'0'..=b'9') => self.number(),
             _ => self.word(),
         }
     }
 
-    fn nested(&mut self, parse: fn(&mut Self) -> Result<Value, Halt>) -> Result<usize, Halt> {
+    fn nested(
+        &mut self,
+        parse: fn(&mut Self) -> Result<JsonValue, JsonHalt>,
+    ) -> Result<usize, JsonHalt> {
         self.at += 1;
         self.depth += 1;
         let value = parse(self)?;
@@ -174,15 +177,15 @@ impl Parser<'_, '_, '_> {
         self.add(value)
     }
 
-    fn array(&mut self) -> Result<Value, Halt> {
+    fn array(&mut self) -> Result<JsonValue, JsonHalt> {
         let mut elements = Vec::new();
         if self.take(b']') {
-            return Ok(Value::Array(elements));
+            return Ok(JsonValue::Array(elements));
         }
         loop {
             elements.push(self.value()?);
             if self.take(b']') {
-                return Ok(Value::Array(elements));
+                return Ok(JsonValue::Array(elements));
             }
             if !self.take(b',') {
                 return self.fault("expected `,` or `]`");
@@ -190,7 +193,7 @@ impl Parser<'_, '_, '_> {
         }
     }
 
-    fn object(&mut self) -> Result<Value, Halt> {
+    fn object(&mut self) -> Result<JsonValue, JsonHalt> {
         let mut members: Vec<(String, usize)> = Vec::new();
         let mut keys = BTreeSet::new();
         if !self.take(b'}') {
@@ -218,7 +221,7 @@ impl Parser<'_, '_, '_> {
         }
         members.sort();
         let terms = &mut *self.sink.terms;
-        Ok(Value::Object(
+        Ok(JsonValue::Object(
             members
                 .into_iter()
                 .map(|(key, value)| (terms.intern_string(&key), value))
@@ -226,12 +229,12 @@ impl Parser<'_, '_, '_> {
         ))
     }
 
-    fn word(&mut self) -> Result<usize, Halt> {
+    fn word(&mut self) -> Result<usize, JsonHalt> {
         for (word, truth) in [("true", Some(true)), ("false", Some(false)), ("null", None)] {
             if self.text[self.at..].starts_with(word) {
                 self.at += word.len();
                 let value = truth.map(|truth| self.sink.terms.intern(Term::Boolean(truth)));
-                return self.add(value.map_or(Value::Null, Value::Bool));
+                return self.add(value.map_or(JsonValue::Null, JsonValue::Bool));
             }
         }
         self.fault("expected a value")
@@ -246,7 +249,7 @@ impl Parser<'_, '_, '_> {
         count
     }
 
-    fn number(&mut self) -> Result<usize, Halt> {
+    fn number(&mut self) -> Result<usize, JsonHalt> {
         let (start, bytes) = (self.at, self.text.as_bytes());
         let is = |at: usize, wanted: &[u8]| bytes.get(at).is_some_and(|byte| wanted.contains(byte));
         self.at += usize::from(is(self.at, b"-"));
@@ -284,11 +287,11 @@ impl Parser<'_, '_, '_> {
             return self.fault("the number is out of range");
         };
         let id = self.sink.terms.intern(term);
-        self.add(Value::Number(id))
+        self.add(JsonValue::Number(id))
     }
 
     /// Reads a string from its opening quote on.
-    fn string(&mut self) -> Result<String, Halt> {
+    fn string(&mut self) -> Result<String, JsonHalt> {
         let start = self.at;
         self.at += 1;
         let mut text = String::new();
@@ -312,7 +315,7 @@ impl Parser<'_, '_, '_> {
     }
 
     /// Reads an escape from its backslash on.
-    fn escape(&mut self) -> Result<char, Halt> {
+    fn escape(&mut self) -> Result<char, JsonHalt> {
         let found = match self.text.as_bytes().get(self.at + 1) {
             Some(b'u') => return self.code_point(),
             Some(b'n') => '\n',
@@ -328,7 +331,7 @@ impl Parser<'_, '_, '_> {
     }
 
     /// Reads `\uXXXX`, or the two escapes of a surrogate pair.
-    fn code_point(&mut self) -> Result<char, Halt> {
+    fn code_point(&mut self) -> Result<char, JsonHalt> {
         let unit = |at: usize| {
             let digits = self.text.get(at..at + 6)?.strip_prefix("\\u")?;
             let is_hex = digits.bytes().all(|byte| byte.is_ascii_hexdigit());
@@ -345,10 +348,15 @@ impl Parser<'_, '_, '_> {
 
 /// Adds the facts of the values. They are numbered as Nemo does it: the parts of a value when it is
 /// visited, and the last part is visited first.
-fn emit(values: &[Value], root: usize, limit: usize, sink: &mut Sink<'_>) -> std::io::Result<()> {
+fn emit(
+    values: &[JsonValue],
+    root: usize,
+    limit: usize,
+    sink: &mut ImportSink<'_>,
+) -> std::io::Result<()> {
     let [kind, content] = ["type", "value"].map(|name| sink.terms.intern_iri(name));
     let (mut stack, mut last, mut left) = (vec![(0_i64, root)], 0_i64, limit);
-    let mut row = |sink: &mut Sink<'_>, make: &dyn Fn(&mut Terms) -> [TermId; 3]| {
+    let mut row = |sink: &mut ImportSink<'_>, make: &dyn Fn(&mut Terms) -> [TermId; 3]| {
         if left == 0 {
             return Ok(());
         }
@@ -361,13 +369,14 @@ fn emit(values: &[Value], root: usize, limit: usize, sink: &mut Sink<'_>) -> std
     while let Some((number, at)) = stack.pop() {
         let id = sink.terms.intern(Term::Integer(number));
         let (name, atom, parts) = match &values[at] {
-            Value::Null => ("null", None, Vec::new()),
-            Value::Bool(id) => ("bool", Some(*id), Vec::new()),
-            Value::Number(id) => ("number", Some(*id), Vec::new()),
-            Value::Text(id) => ("string", Some(*id), Vec::new()),
-            Value::Array(elements) => {
-                let key =
-                    |key: usize, sink: &mut Sink<'_>| sink.terms.intern(Term::Integer(key as i64));
+            JsonValue::Null => ("null", None, Vec::new()),
+            JsonValue::Bool(id) => ("bool", Some(*id), Vec::new()),
+            JsonValue::Number(id) => ("number", Some(*id), Vec::new()),
+            JsonValue::Text(id) => ("string", Some(*id), Vec::new()),
+            JsonValue::Array(elements) => {
+                let key = |key: usize, sink: &mut ImportSink<'_>| {
+                    sink.terms.intern(Term::Integer(key as i64))
+                };
                 (
                     "array",
                     None,
@@ -378,7 +387,7 @@ fn emit(values: &[Value], root: usize, limit: usize, sink: &mut Sink<'_>) -> std
                         .collect(),
                 )
             }
-            Value::Object(members) => ("object", None, members.clone()),
+            JsonValue::Object(members) => ("object", None, members.clone()),
         };
         row(sink, &|terms| [id, kind, terms.intern_string(name)])?;
         if let Some(atom) = atom {

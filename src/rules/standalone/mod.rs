@@ -20,5 +20,5 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-pub use program::{Closure, Engine, Loading, Program};
+pub use program::{Closure, Engine, FactFault, Loading, Program};
 pub use run::{Summary, run, run_as};

@@ -17,6 +17,7 @@ use crate::model::universe::Universe;
 use crate::standalone::import::{define_imports, import};
 use crate::standalone::input::Limits;
 use crate::syntax::{Expression, Statement, Syntax, parse};
+use crate::watch::Stop;
 use actcheck_base::{
     Diagnostic, Diagnostics, RuleFault, Source, Term, TermId, Terms, did_you_mean,
 };
@@ -73,6 +74,25 @@ impl Default for Loading {
     }
 }
 
+/// Why facts can't be added to a program.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FactFault {
+    /// The program does not use this predicate.
+    #[error("the program has no predicate `{0}`")]
+    UnknownPredicate(String),
+    /// A row has the wrong number of terms.
+    #[error("a row of `{predicate}` has {terms} terms instead of {arity}")]
+    Width {
+        /// The predicate.
+        predicate: String,
+        /// Number of terms of the row.
+        terms: usize,
+        /// Number of arguments of the predicate.
+        arity: usize,
+    },
+}
+
 /// A checked program with its facts. Unlike the rules of a property, it has only predicates of its
 /// own.
 ///
@@ -106,6 +126,8 @@ pub struct Program {
     pub(crate) planned: Planned,
     /// Warnings about the program.
     pub warnings: Diagnostics,
+    /// Those of them about rules that may make new things without end.
+    pub(super) endless: Diagnostics,
 }
 
 /// Everything that a program derives, including its facts.
@@ -247,11 +269,8 @@ impl Program {
                     .map(|rows| rows.len() / predicates.get(id).width)
             })
             .collect();
-        diagnostics.extend(warnings(
-            &program.rules,
-            &predicates,
-            &Universe::new(&terms, None),
-        ));
+        let endless = warnings(&program.rules, &predicates, &Universe::new(&terms, None));
+        diagnostics.extend(endless.clone());
         let mut indexes = Indexes::new(&predicates);
         let planned = Planned::new(program, strata, &mut indexes, &|id| sizes[id]);
         let terms = Arc::new(terms);
@@ -262,30 +281,33 @@ impl Program {
             indexes,
             planned,
             warnings: diagnostics,
+            endless,
         })
     }
 
     /// Adds facts of a predicate that the program uses.
     ///
     /// # Errors
-    /// The program does not use the predicate, or a row has the wrong number of terms.
+    /// [`FactFault`] if the program does not use the predicate, or a row has the wrong number of
+    /// terms.
     pub fn add_facts<'t>(
         &mut self,
         predicate: &str,
         rows: impl IntoIterator<Item = &'t [Term]>,
-    ) -> Result<(), String> {
+    ) -> Result<(), FactFault> {
         let id = self
             .predicates
             .find(0, predicate, None)
-            .ok_or_else(|| format!("the program has no predicate `{predicate}`"))?;
+            .ok_or_else(|| FactFault::UnknownPredicate(predicate.to_owned()))?;
         let width = self.predicates.get(id).arity;
         let facts = self.planned.facts.entry(id).or_default();
         for row in rows {
             if row.len() != width || width == 0 {
-                return Err(format!(
-                    "a row of `{predicate}` has {} terms instead of {width}",
-                    row.len()
-                ));
+                return Err(FactFault::Width {
+                    predicate: predicate.to_owned(),
+                    terms: row.len(),
+                    arity: width,
+                });
             }
             let terms = Arc::make_mut(&mut self.terms);
             facts.extend(row.iter().map(|term| terms.intern(term.clone())));
@@ -298,6 +320,15 @@ impl Program {
     /// # Errors
     /// The budget was exceeded; the fault names the rule.
     pub fn close(&self, engine: Engine, budget: &Budget) -> Result<Closure, RuleFault> {
+        self.closed(engine, budget).map_err(|(fault, _)| fault)
+    }
+
+    /// As [`Program::close`], with the reason why the evaluation stopped.
+    pub(super) fn closed(
+        &self,
+        engine: Engine,
+        budget: &Budget,
+    ) -> Result<Closure, (RuleFault, Stop)> {
         let mut universe = Universe::new(&self.terms, None);
         let mut meter = Meter::new(budget);
         let rows: Vec<(PredicateId, Vec<TermId>)> = match engine {
@@ -314,12 +345,14 @@ impl Program {
                     &mut universe,
                     &mut meter,
                 )
-                .map_err(|stopped| fault(&meter, stopped, &self.planned))?;
+                .map_err(|stopped| (fault(&meter, stopped, &self.planned), stopped.stop))?;
                 (0..self.predicates.len())
                     .map(|id| (id, layers.own.take_rows(id)))
                     .collect()
             }
-            Engine::Naive => self.naive(&mut universe, &mut meter)?,
+            Engine::Naive => self
+                .naive(&mut universe, &mut meter)
+                .map_err(|stop| (meter.fault(stop, None), stop))?,
         };
         let mut tables = BTreeMap::new();
         for (id, rows) in rows {
@@ -339,7 +372,7 @@ impl Program {
         &self,
         universe: &mut Universe<'_>,
         meter: &mut Meter,
-    ) -> Result<Vec<(PredicateId, Vec<TermId>)>, RuleFault> {
+    ) -> Result<Vec<(PredicateId, Vec<TermId>)>, Stop> {
         let mut sets = naive::Sets::new();
         for (predicate, rows) in &self.planned.facts {
             let width = self.predicates.get(*predicate).width;
@@ -353,8 +386,7 @@ impl Program {
             endless,
             ..
         } = &self.planned;
-        naive::close(rules, strata, endless, &mut sets, universe, meter)
-            .map_err(|stop| meter.fault(stop, None))?;
+        naive::close(rules, strata, endless, &mut sets, universe, meter)?;
         let rows = |id| {
             sets.get(&id)
                 .map_or(Vec::new(), |set| set.iter().flatten().copied().collect())

@@ -36,11 +36,11 @@ pub(super) struct Records<R> {
 #[derive(Debug, Clone)]
 struct Field {
     bytes: Range<usize>,
-    form: Form,
+    form: FieldForm,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Form {
+enum FieldForm {
     /// The bytes are the text.
     Plain,
     /// The bytes have doubled quotes. They include the opening quote, and the closing one if text
@@ -50,7 +50,7 @@ enum Form {
 
 /// Whether another row was found.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) enum Found {
+pub(super) enum RowRead {
     Row,
     End,
     /// The file ends in a quoted field, or the row is too long: nothing else can be read.
@@ -91,7 +91,7 @@ impl<R: Read> Records<R> {
     ///
     /// # Errors
     /// Reading failed.
-    pub(super) fn next(&mut self) -> std::io::Result<Found> {
+    pub(super) fn next(&mut self) -> std::io::Result<RowRead> {
         self.line += std::mem::take(&mut self.newlines);
         self.start = self.at;
         self.fields.clear();
@@ -102,7 +102,7 @@ impl<R: Read> Records<R> {
             }
             if self.at - self.start > MAX_ROW {
                 let place = self.place(field);
-                return Ok(Found::Broken(
+                return Ok(RowRead::Broken(
                     place,
                     "the row that begins here is longer than 64 MiB; a quote may be missing",
                 ));
@@ -134,7 +134,7 @@ impl<R: Read> Records<R> {
                     }
                     self.push(state, field, offset, doubled);
                     if byte != self.delimiter {
-                        return Ok(Found::Row);
+                        return Ok(RowRead::Row);
                     }
                     (field, doubled) = (offset + 1, false);
                     State::Start
@@ -164,34 +164,34 @@ impl<R: Read> Records<R> {
     }
 
     /// Ends the last row at the end of the file.
-    fn end(&mut self, state: State, field: usize, doubled: bool) -> Found {
+    fn end(&mut self, state: State, field: usize, doubled: bool) -> RowRead {
         if state == State::Start && self.fields.is_empty() {
-            return Found::End;
+            return RowRead::End;
         }
         if state == State::Quoted {
-            return Found::Broken(self.place(field), "the quote that begins here has no end");
+            return RowRead::Broken(self.place(field), "the quote that begins here has no end");
         }
         self.push(state, field, self.at - self.start, doubled);
-        Found::Row
+        RowRead::Row
     }
 
     fn push(&mut self, state: State, start: usize, end: usize, doubled: bool) {
         let field = match state {
             State::Torn => Field {
                 bytes: start..end,
-                form: Form::Escaped { torn: true },
+                form: FieldForm::Escaped { torn: true },
             },
             State::Quote if doubled => Field {
                 bytes: start..end - 1,
-                form: Form::Escaped { torn: false },
+                form: FieldForm::Escaped { torn: false },
             },
             State::Quote => Field {
                 bytes: start + 1..end - 1,
-                form: Form::Plain,
+                form: FieldForm::Plain,
             },
             _ => Field {
                 bytes: start..end,
-                form: Form::Plain,
+                form: FieldForm::Plain,
             },
         };
         self.fields.push(field);
@@ -234,14 +234,14 @@ impl<R: Read> Records<R> {
         let text =
             std::str::from_utf8(&self.buffer[self.start + bytes.start..self.start + bytes.end])?;
         Ok(match form {
-            Form::Plain => Cow::Borrowed(text),
-            Form::Escaped { .. } => Cow::Owned(unescaped(text)),
+            FieldForm::Plain => Cow::Borrowed(text),
+            FieldForm::Escaped { .. } => Cow::Owned(unescaped(text)),
         })
     }
 
     /// Returns whether text follows the closing quote of a field.
     pub(super) fn is_torn(&self, field: usize) -> bool {
-        self.fields[field].form == Form::Escaped { torn: true }
+        self.fields[field].form == FieldForm::Escaped { torn: true }
     }
 
     /// Returns the place of a field, or of the row's beginning if it has no such field.
@@ -295,7 +295,7 @@ mod tests {
     use super::*;
 
     /// The rows of a text, read in chunks of one byte, and how it ended.
-    fn rows(text: &str, quoting: bool) -> (Vec<Vec<String>>, Found) {
+    fn rows(text: &str, quoting: bool) -> (Vec<Vec<String>>, RowRead) {
         struct Slow<'a>(&'a [u8]);
         impl Read for Slow<'_> {
             fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
@@ -307,7 +307,7 @@ mod tests {
         let mut rows = Vec::new();
         loop {
             match records.next().expect("a slice can be read") {
-                Found::Row => rows.push(
+                RowRead::Row => rows.push(
                     (0..records.len())
                         .map(|field| records.text(field).expect("it is UTF-8").into_owned())
                         .collect(),
@@ -343,7 +343,7 @@ mod tests {
         for text in quotes.into_iter().chain(plain) {
             for quoting in [true, false] {
                 let (found, end) = rows(text, quoting);
-                if end != Found::End {
+                if end != RowRead::End {
                     continue;
                 }
                 let mut reader = csv::ReaderBuilder::new();
@@ -371,12 +371,12 @@ mod tests {
         let text = "a\r\n\r\"é\n\",\"x\"y\n\n\"b";
         let mut records = Records::new(text.as_bytes(), b',', true);
         let place = |line, column| Place { line, column };
-        assert_eq!(records.next().ok(), Some(Found::Row));
+        assert_eq!(records.next().ok(), Some(RowRead::Row));
         assert_eq!(
             (records.place_of(0), records.is_torn(0)),
             (place(1, 1), false)
         );
-        assert_eq!(records.next().ok(), Some(Found::Row));
+        assert_eq!(records.next().ok(), Some(RowRead::Row));
         assert_eq!(
             (records.place_of(1), records.is_torn(1)),
             (place(4, 3), true)
@@ -384,7 +384,7 @@ mod tests {
         assert_eq!(records.text(1).ok().as_deref(), Some("xy"));
         assert_eq!(
             records.next().ok(),
-            Some(Found::Broken(
+            Some(RowRead::Broken(
                 place(6, 1),
                 "the quote that begins here has no end"
             ))
@@ -396,7 +396,7 @@ mod tests {
         let mut records = Records::new(std::io::repeat(b'x'), b',', true);
         assert!(matches!(
             records.next(),
-            Ok(Found::Broken(Place { line: 1, column: 1 }, _))
+            Ok(RowRead::Broken(Place { line: 1, column: 1 }, _))
         ));
     }
 }

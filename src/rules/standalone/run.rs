@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use crate::engine::budget::Budget;
-use crate::engine::meter::NEW_THINGS;
 use crate::standalone::export::{exports, write};
 use crate::standalone::program::{Engine, Loading, Program};
+use crate::watch::Stop;
 use actcheck_base::{Diagnostic, Diagnostics, Files, RuleFault, Source};
 
 /// Results of running a program.
@@ -49,8 +49,8 @@ pub fn run_as(path: &Path, out_dir: &Path, loading: &Loading) -> Result<Summary,
         return Err(diagnostics);
     }
     let closure = program
-        .close(Engine::Fast, &loading.budget)
-        .map_err(|fault| stopped(&fault, &program.warnings, &source))?;
+        .closed(Engine::Fast, &loading.budget)
+        .map_err(|(fault, stop)| stopped(&fault, stop, &program.endless, &source))?;
     let mut summary = Summary {
         warnings: program.warnings,
         ..Summary::default()
@@ -60,14 +60,14 @@ pub fn run_as(path: &Path, out_dir: &Path, loading: &Loading) -> Result<Summary,
         .map(|name| (name.to_owned(), closure.count(name)))
         .collect();
     for export in exports {
-        let written =
-            write(&export, out_dir, &closure, &loading.budget.stop).map_err(|reason| {
-                let message = format!(
-                    "`{}` can't be written: {reason}",
-                    out_dir.join(&export.path).display()
-                );
-                Diagnostic::error("R073", message).in_source(&source)
-            })?;
+        let written = write(&export, out_dir, &closure, &loading.budget.stop).map_err(|error| {
+            let reason = error.to_string().to_lowercase();
+            let message = format!(
+                "`{}` can't be written: {reason}",
+                out_dir.join(&export.path).display()
+            );
+            Diagnostic::error("R073", message).in_source(&source)
+        })?;
         if written.left_out > 0 {
             let count = written.left_out;
             let rows = if count == 1 {
@@ -94,8 +94,8 @@ pub fn run_as(path: &Path, out_dir: &Path, loading: &Loading) -> Result<Summary,
 }
 
 /// Returns the error of a stopped evaluation; if there were too many new things, after the warnings
-/// that say why.
-fn stopped(fault: &RuleFault, warnings: &Diagnostics, source: &Source) -> Diagnostics {
+/// `endless`, which say why.
+fn stopped(fault: &RuleFault, stop: Stop, endless: &Diagnostics, source: &Source) -> Diagnostics {
     if *fault == RuleFault::Interrupted {
         return Diagnostic::error("R091", fault.to_string())
             .in_source(source)
@@ -110,11 +110,8 @@ fn stopped(fault: &RuleFault, warnings: &Diagnostics, source: &Source) -> Diagno
             .into();
     }
     let mut found = Diagnostics::new();
-    let help = if fault.reason().contains(NEW_THINGS) {
-        warnings
-            .iter()
-            .filter(|warning| warning.code == "R063")
-            .for_each(|warning| found.push(warning.clone()));
+    let help = if stop == Stop::NewThings {
+        found.extend(endless.clone());
         "a rule that makes new things for its own things may never terminate; `--max-new` sets the limit"
     } else {
         "a recursive rule that computes new values may never terminate; add a limit such as `?x < 100`"

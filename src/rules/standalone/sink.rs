@@ -7,7 +7,7 @@ use actcheck_base::{TermId, Terms};
 const ROWS_PER_CHECK: u32 = 4096;
 
 /// The rows of one predicate.
-pub(super) struct Sink<'a> {
+pub(super) struct ImportSink<'a> {
     pub(super) terms: &'a mut Terms,
     pub(super) rows: &'a mut Vec<TermId>,
     pub(super) limits: &'a Limits<'a>,
@@ -17,7 +17,7 @@ pub(super) struct Sink<'a> {
     pub(super) unchecked: u32,
 }
 
-impl Sink<'_> {
+impl ImportSink<'_> {
     /// Adds the row that `intern` appends to its argument. If `intern` returns `false`, there is
     /// none.
     ///

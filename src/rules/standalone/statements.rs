@@ -8,7 +8,7 @@ use oxrdfio::{RdfFormat, RdfParseError, RdfParser};
 
 use crate::model::rdf::from_rdf;
 use crate::standalone::faults::{Faults, Place};
-use crate::standalone::sink::Sink;
+use crate::standalone::sink::ImportSink;
 use actcheck_base::{Term, TermId, Terms, TurtleGuard, XmlGuard, XmlProgress};
 
 /// Nemo's name for the default graph.
@@ -28,7 +28,7 @@ pub(super) fn read_rdf(
     format: RdfFormat,
     base: Option<&str>,
     limit: usize,
-    sink: &mut Sink<'_>,
+    sink: &mut ImportSink<'_>,
     faults: &mut Faults,
 ) -> std::io::Result<()> {
     let mut parser = RdfParser::from_format(format);

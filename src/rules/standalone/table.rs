@@ -5,8 +5,8 @@ use std::io::Read;
 
 use crate::model::values::{Number, double_term, integer, is_beyond_64_bits, literal};
 use crate::standalone::faults::Faults;
-use crate::standalone::records::{Found, Records};
-use crate::standalone::sink::Sink;
+use crate::standalone::records::{Records, RowRead};
+use crate::standalone::sink::ImportSink;
 use actcheck_base::{Term, TermId, Terms, names};
 
 /// How the fields of a column are parsed.
@@ -80,20 +80,20 @@ pub(super) fn read_table(
     reader: impl Read,
     layout: &Layout,
     limit: usize,
-    sink: &mut Sink<'_>,
+    sink: &mut ImportSink<'_>,
     faults: &mut Faults,
 ) -> std::io::Result<()> {
     let mut records = Records::new(reader, layout.delimiter, layout.quoting);
     let (mut count, mut skip) = (0, layout.headers);
     while count < limit {
         match records.next()? {
-            Found::End => break,
-            Found::Broken(place, why) => {
+            RowRead::End => break,
+            RowRead::Broken(place, why) => {
                 faults.add_last(place, || why.to_owned());
                 break;
             }
-            Found::Row if skip => skip = false,
-            Found::Row => {
+            RowRead::Row if skip => skip = false,
+            RowRead::Row => {
                 count += 1;
                 sink.row(|terms, row| intern_row(&records, &layout.columns, terms, row, faults))?;
             }

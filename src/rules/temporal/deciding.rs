@@ -1,22 +1,25 @@
 //! The comparisons that decide a formula: as text, and as signals to draw.
 
 use crate::syntax::Comparison;
-use crate::temporal::formula::{Formula, Quantity};
+use crate::temporal::formula::{CheckedFormula, Quantity};
 use crate::temporal::semantics::{Reader, compares};
 use actcheck_base::{DecidingSignal, Span, names};
 
 /// A part of the reason for which a formula holds or fails.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Decisive<'f> {
+pub(super) enum DecidingPart<'f> {
     /// A comparison, or a quantity that is true or false, at a sample.
-    Atom { at: usize, formula: &'f Formula },
+    Atom {
+        at: usize,
+        formula: &'f CheckedFormula,
+    },
     /// The sample from which on a condition fails.
     Since { at: usize },
     /// The action ends before the interval of an operator begins.
     NoTime,
 }
 
-impl Decisive<'_> {
+impl DecidingPart<'_> {
     /// Returns the sentence.
     pub(super) fn text(
         &self,
@@ -32,7 +35,7 @@ impl Decisive<'_> {
         };
         let secs = shown(reader.secs(at));
         match formula {
-            Formula::Compare {
+            CheckedFormula::Compare {
                 op,
                 left,
                 right,
@@ -54,7 +57,7 @@ impl Decisive<'_> {
                     shown(right)
                 ))
             }
-            Formula::Truth { quantity, span } => {
+            CheckedFormula::Truth { quantity, span } => {
                 let holds = *reader.quantity(quantity)?.get(at)? != 0.0;
                 let word = if holds { "is" } else { "is not" };
                 Some(format!(
@@ -69,16 +72,16 @@ impl Decisive<'_> {
 
 /// Returns a deciding comparison over the whole action; `None` for the other parts.
 pub(super) fn deciding_signal(
-    decisive: &Decisive<'_>,
+    decisive: &DecidingPart<'_>,
     reader: &Reader<'_>,
     source: &dyn Fn(Span) -> String,
 ) -> Option<DecidingSignal> {
-    let Decisive::Atom { at, formula } = decisive else {
+    let DecidingPart::Atom { at, formula } = decisive else {
         return None;
     };
     let period_secs = reader.course.period_secs;
     match formula {
-        Formula::Compare {
+        CheckedFormula::Compare {
             op,
             left,
             right,
@@ -113,7 +116,7 @@ pub(super) fn deciding_signal(
                 at: *at,
             })
         }
-        Formula::Truth { quantity, span } => {
+        CheckedFormula::Truth { quantity, span } => {
             let values = reader.quantity(quantity)?;
             let holds: Vec<bool> = values.iter().map(|value| *value != 0.0).collect();
             let (quantity, interval) = (readable(&source(span.clone())), around(&holds, *at));

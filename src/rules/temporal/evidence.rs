@@ -2,8 +2,8 @@
 
 use crate::model::universe::Universe;
 use crate::syntax::TemporalOperator;
-use crate::temporal::deciding::{Decisive, deciding_signal};
-use crate::temporal::formula::{Formula, Timed};
+use crate::temporal::deciding::{DecidingPart, deciding_signal};
+use crate::temporal::formula::{CheckedFormula, Timed};
 use crate::temporal::semantics::Reader;
 use crate::watch::Watch;
 use actcheck_base::{DecidingSignal, Span, TermId};
@@ -28,7 +28,7 @@ impl Timed {
         let formula = self.formulas.first()?;
         let reader = Reader::new(binding, terms, watch)?;
         let mut found = Vec::new();
-        Search { reader: &reader }.decides(formula, reader.moment(formula), &mut found)?;
+        EvidenceSearch { reader: &reader }.decides(formula, reader.moment(formula), &mut found)?;
         let texts: Option<Vec<String>> =
             found.iter().map(|one| one.text(&reader, source)).collect();
         let signals = found
@@ -50,7 +50,7 @@ impl Timed {
         watch: &Watch,
     ) -> Option<f64> {
         let reader = Reader::new(binding, terms, watch)?;
-        let mut nearest: Option<(f64, &Formula)> = None;
+        let mut nearest: Option<(f64, &CheckedFormula)> = None;
         for formula in &self.formulas {
             let robustness = reader.robustness(formula)?;
             if nearest.is_none_or(|(known, _)| robustness < known) {
@@ -59,37 +59,39 @@ impl Timed {
         }
         let (_, formula) = nearest?;
         let mut found = Vec::new();
-        Search { reader: &reader }.decides(formula, reader.moment(formula), &mut found)?;
+        EvidenceSearch { reader: &reader }.decides(formula, reader.moment(formula), &mut found)?;
         let at = found.iter().find_map(|one| match one {
-            Decisive::Atom { at, .. } => Some(*at),
-            Decisive::Since { .. } | Decisive::NoTime => None,
+            DecidingPart::Atom { at, .. } => Some(*at),
+            DecidingPart::Since { .. } | DecidingPart::NoTime => None,
         });
         at.map(|at| reader.secs(at))
     }
 }
 
-struct Search<'a> {
+struct EvidenceSearch<'a> {
     reader: &'a Reader<'a>,
 }
 
-impl Search<'_> {
+impl EvidenceSearch<'_> {
     /// Appends the values that decide a formula at a sample.
     fn decides<'f>(
         &self,
-        formula: &'f Formula,
+        formula: &'f CheckedFormula,
         at: usize,
-        found: &mut Vec<Decisive<'f>>,
+        found: &mut Vec<DecidingPart<'f>>,
     ) -> Option<()> {
         match formula {
-            Formula::Compare { .. } | Formula::Truth { .. } => {
-                found.push(Decisive::Atom { at, formula });
+            CheckedFormula::Compare { .. } | CheckedFormula::Truth { .. } => {
+                found.push(DecidingPart::Atom { at, formula });
                 Some(())
             }
-            Formula::Not(inner) | Formula::Consequent { formula: inner, .. } => {
+            CheckedFormula::Not(inner) | CheckedFormula::Consequent { formula: inner, .. } => {
                 self.decides(inner, at, found)
             }
-            Formula::And(parts) => self.decides(self.extreme(parts, at, f64::lt)?, at, found),
-            Formula::Or(parts) => {
+            CheckedFormula::And(parts) => {
+                self.decides(self.extreme(parts, at, f64::lt)?, at, found)
+            }
+            CheckedFormula::Or(parts) => {
                 let best = self.extreme(parts, at, f64::gt)?;
                 if *self.reader.over_time(best)?.get(at)? > 0.0 {
                     return self.decides(best, at, found);
@@ -99,7 +101,7 @@ impl Search<'_> {
                     .iter()
                     .try_for_each(|part| self.decides(part, at, found))
             }
-            Formula::Temporal {
+            CheckedFormula::Temporal {
                 operator,
                 from,
                 to,
@@ -112,11 +114,11 @@ impl Search<'_> {
     /// Returns the part with the smallest or largest robustness at a sample.
     fn extreme<'f>(
         &self,
-        parts: &'f [Formula],
+        parts: &'f [CheckedFormula],
         at: usize,
         better: fn(&f64, &f64) -> bool,
-    ) -> Option<&'f Formula> {
-        let mut best: Option<(f64, &Formula)> = None;
+    ) -> Option<&'f CheckedFormula> {
+        let mut best: Option<(f64, &CheckedFormula)> = None;
         for part in parts {
             let value = *self.reader.over_time(part)?.get(at)?;
             if best.is_none_or(|(known, _)| better(&value, &known)) {
@@ -130,9 +132,9 @@ impl Search<'_> {
         &self,
         operator: TemporalOperator,
         (from, to): (f64, f64),
-        parts: &'f [Formula],
+        parts: &'f [CheckedFormula],
         at: usize,
-        found: &mut Vec<Decisive<'f>>,
+        found: &mut Vec<DecidingPart<'f>>,
     ) -> Option<()> {
         let count = self.reader.course.count;
         let window = self.reader.window(from, to);
@@ -146,7 +148,7 @@ impl Search<'_> {
                 .collect()
         };
         if times.is_empty() {
-            found.push(Decisive::NoTime);
+            found.push(DecidingPart::NoTime);
             return Some(());
         }
         let decisive = parts.last()?;
@@ -172,7 +174,7 @@ impl Search<'_> {
                 .last()
                 .unwrap_or(chosen);
             if since < chosen {
-                found.push(Decisive::Since { at: since });
+                found.push(DecidingPart::Since { at: since });
             }
         }
         if let [first, second] = parts {

@@ -10,7 +10,7 @@ use actcheck_base::{Span, Term, TermId};
 
 /// A checked formula.
 #[derive(Debug, Clone)]
-pub(crate) enum Formula {
+pub(crate) enum CheckedFormula {
     /// The comparison of two quantities.
     Compare {
         op: Comparison,
@@ -23,12 +23,12 @@ pub(crate) enum Formula {
         quantity: Quantity,
         span: Span,
     },
-    Not(Box<Formula>),
-    And(Vec<Formula>),
-    Or(Vec<Formula>),
+    Not(Box<CheckedFormula>),
+    And(Vec<CheckedFormula>),
+    Or(Vec<CheckedFormula>),
     /// The right side of `a implies b`, which is the formula `~a or b`.
     Consequent {
-        formula: Box<Formula>,
+        formula: Box<CheckedFormula>,
         /// Whether the property can only become harder to pass if this is false.
         needed: bool,
     },
@@ -38,7 +38,7 @@ pub(crate) enum Formula {
         operator: TemporalOperator,
         from: f64,
         to: f64,
-        parts: Vec<Formula>,
+        parts: Vec<CheckedFormula>,
         span: Span,
     },
 }
@@ -64,7 +64,7 @@ pub(crate) enum Thing {
     Variable(Variable),
 }
 
-impl Formula {
+impl CheckedFormula {
     /// Calls a function with this formula and all its parts.
     pub(crate) fn visit<'f>(&'f self, see: &mut impl FnMut(&'f Self)) {
         see(self);
@@ -137,13 +137,13 @@ enum Asked {
 /// Formulas that a rule joins, and the value that it asks of them.
 #[derive(Debug, Clone)]
 pub(crate) struct Timed {
-    pub(super) formulas: Vec<Formula>,
+    pub(super) formulas: Vec<CheckedFormula>,
     asked: Asked,
 }
 
 impl Timed {
     /// Asks whether a formula holds.
-    pub(crate) fn truth(formula: Formula) -> Self {
+    pub(crate) fn truth(formula: CheckedFormula) -> Self {
         Self {
             formulas: vec![formula],
             asked: Asked::Truth,
@@ -151,7 +151,7 @@ impl Timed {
     }
 
     /// Asks for the robustness of several formulas together: the smallest.
-    pub(super) fn robustness_of(formulas: Vec<Formula>) -> Self {
+    pub(super) fn robustness_of(formulas: Vec<CheckedFormula>) -> Self {
         Self {
             formulas,
             asked: Asked::Robustness,
@@ -159,7 +159,7 @@ impl Timed {
     }
 
     /// Asks for the moment that decides several formulas together.
-    pub(super) fn moment_of(formulas: Vec<Formula>) -> Self {
+    pub(super) fn moment_of(formulas: Vec<CheckedFormula>) -> Self {
         Self {
             formulas,
             asked: Asked::Moment,
@@ -179,12 +179,12 @@ impl Timed {
     }
 
     /// Returns its formulas.
-    pub(crate) fn formulas(&self) -> &[Formula] {
+    pub(crate) fn formulas(&self) -> &[CheckedFormula] {
         &self.formulas
     }
 
     /// Returns its formulas, to be changed.
-    pub(crate) fn formulas_mut(&mut self) -> &mut [Formula] {
+    pub(crate) fn formulas_mut(&mut self) -> &mut [CheckedFormula] {
         &mut self.formulas
     }
 

@@ -6,8 +6,8 @@ use crate::builtins;
 use crate::check::checking::{Checking, Role};
 use crate::model::expression::Expr;
 use crate::model::program::{
-    Aggregate, AggregateKind, Aggregation, Atom, Literal, Operand, PredicateId, Predicates,
-    Program, Rule, Scope,
+    Aggregate, AggregateKind, Aggregation, Atom, CheckedProgram, Literal, Operand, PredicateId,
+    Predicates, Rule, Scope,
 };
 use crate::syntax::Syntax;
 use crate::temporal::Timed;
@@ -31,7 +31,7 @@ pub(crate) fn reads_course(rule: &Rule, predicates: &Predicates) -> bool {
 /// rule that decides must read a formula.
 pub(crate) fn add_margin(
     checking: &mut Checking<'_>,
-    program: &mut Program,
+    program: &mut CheckedProgram,
     syntax: &Syntax,
     scope: Scope,
 ) {
@@ -81,7 +81,7 @@ pub(crate) fn add_margin(
 
 /// Warns (R057) of formulas in the rules of helper predicates: their robustness is not part of the
 /// margin.
-fn warn_of_helpers(checking: &mut Checking<'_>, program: &Program, decisive: PredicateId) {
+fn warn_of_helpers(checking: &mut Checking<'_>, program: &CheckedProgram, decisive: PredicateId) {
     let (mut reached, mut waiting) = (BTreeSet::new(), vec![decisive]);
     while let Some(predicate) = waiting.pop() {
         if predicate != decisive && !reached.insert(predicate) {
@@ -118,7 +118,7 @@ fn warn_of_helpers(checking: &mut Checking<'_>, program: &Program, decisive: Pre
                 .filter(|formula| !is_of_the_start(formula))
             {
                 formula.visit(&mut |part| {
-                    compares |= matches!(part, crate::temporal::Formula::Compare { .. })
+                    compares |= matches!(part, crate::temporal::CheckedFormula::Compare { .. })
                 });
             }
             if compares {
@@ -137,10 +137,10 @@ fn warn_of_helpers(checking: &mut Checking<'_>, program: &Program, decisive: Pre
 
 /// Whether a formula is about the first moment alone, such as `eventually[0, 0](…)`: a fact about
 /// the scene, which no motion changes.
-fn is_of_the_start(formula: &crate::temporal::Formula) -> bool {
+fn is_of_the_start(formula: &crate::temporal::CheckedFormula) -> bool {
     matches!(
         formula,
-        crate::temporal::Formula::Temporal {
+        crate::temporal::CheckedFormula::Temporal {
             from: 0.0,
             to: 0.0,
             ..
@@ -149,7 +149,7 @@ fn is_of_the_start(formula: &crate::temporal::Formula) -> bool {
 }
 
 /// Returns the conditions of a rule that read formulas; `None` if there are none.
-pub(super) fn formulas_of(rule: &Rule) -> Option<Vec<crate::temporal::Formula>> {
+pub(super) fn formulas_of(rule: &Rule) -> Option<Vec<crate::temporal::CheckedFormula>> {
     let formulas: Vec<_> = rule
         .body
         .iter()

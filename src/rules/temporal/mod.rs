@@ -15,7 +15,7 @@ mod vacuous;
 mod windows;
 
 pub(crate) use evidence::Evidence;
-pub(crate) use formula::{Formula, Quantity, Thing, Timed};
+pub(crate) use formula::{CheckedFormula, Quantity, Thing, Timed};
 #[cfg(feature = "sparql")]
 pub(crate) use intervals::named_in;
 pub(crate) use intervals::{IntervalTerms, NO_INTERVALS, lacks_intervals};

@@ -2,7 +2,7 @@
 
 use crate::check::checking::{Checking, Role};
 use crate::model::expression::Expr;
-use crate::model::program::{Atom, Literal, Operand, Program, Rule, Scope};
+use crate::model::program::{Atom, CheckedProgram, Literal, Operand, Rule, Scope};
 use crate::syntax::{LiteralSyntax, Statement, Syntax};
 use crate::temporal::Timed;
 use crate::temporal::margin::formulas_of;
@@ -55,7 +55,7 @@ fn reads_moment(syntax: &Syntax) -> bool {
 
 /// Adds the rules of the predicate: the other conditions of each deciding rule, and the moment that
 /// decides its formulas.
-pub(crate) fn add_moment(checking: &Checking<'_>, program: &mut Program, scope: Scope) {
+pub(crate) fn add_moment(checking: &Checking<'_>, program: &mut CheckedProgram, scope: Scope) {
     let find = |name: &str| checking.predicates.find(scope, name, None);
     let derived = |predicate| {
         program

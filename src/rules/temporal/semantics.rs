@@ -7,7 +7,7 @@ use crate::builtins::Builtin;
 use crate::model::expression::Variable;
 use crate::model::universe::Universe;
 use crate::syntax::{Comparison, TemporalOperator};
-use crate::temporal::formula::{Formula, Quantity, Thing};
+use crate::temporal::formula::{CheckedFormula, Quantity, Thing};
 use crate::temporal::quantities::values_of;
 use crate::temporal::windows::{Window, largest_after, negated, reversed, smallest_after, until};
 use crate::watch::Watch;
@@ -61,7 +61,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Returns whether a formula holds in the action.
-    pub(super) fn holds(&self, formula: &Formula) -> Option<bool> {
+    pub(super) fn holds(&self, formula: &CheckedFormula) -> Option<bool> {
         let robustness = self.robustness(formula)?;
         if robustness != 0.0 {
             return Some(robustness > 0.0);
@@ -76,12 +76,12 @@ impl<'a> Reader<'a> {
     }
 
     /// Returns how far a formula is from flipping in the action; infinite if no number can flip it.
-    pub(super) fn robustness(&self, formula: &Formula) -> Option<f64> {
+    pub(super) fn robustness(&self, formula: &CheckedFormula) -> Option<f64> {
         self.over_time(formula)?.get(self.moment(formula)).copied()
     }
 
     /// Returns the sample at which a formula is read: the first, or the last if it looks back.
-    pub(super) fn moment(&self, formula: &Formula) -> usize {
+    pub(super) fn moment(&self, formula: &CheckedFormula) -> usize {
         if formula.looks_back() {
             self.course.count.saturating_sub(1)
         } else {
@@ -95,7 +95,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Returns the robustness at each sample.
-    pub(super) fn over_time(&self, formula: &Formula) -> Option<Vec<f64>> {
+    pub(super) fn over_time(&self, formula: &CheckedFormula) -> Option<Vec<f64>> {
         self.samples(formula, Scale::Robustness)
     }
 
@@ -104,10 +104,10 @@ impl<'a> Reader<'a> {
         Window::of(from, to, self.course.period_secs)
     }
 
-    fn samples(&self, formula: &Formula, scale: Scale) -> Option<Vec<f64>> {
+    fn samples(&self, formula: &CheckedFormula, scale: Scale) -> Option<Vec<f64>> {
         self.watch.work(size_of::<f64>() * self.course.count)?;
         match formula {
-            Formula::Compare {
+            CheckedFormula::Compare {
                 op, left, right, ..
             } => {
                 let sides = (self.side(left)?, self.side(right)?);
@@ -124,7 +124,7 @@ impl<'a> Reader<'a> {
                     (Scale::Truth, _) => pairs(sides, count, |a, b| sign(compares(*op, a, b))),
                 })
             }
-            Formula::Truth { quantity, .. } => {
+            CheckedFormula::Truth { quantity, .. } => {
                 let factor = if scale == Scale::Truth {
                     1.0
                 } else {
@@ -137,8 +137,8 @@ impl<'a> Reader<'a> {
                         .collect(),
                 )
             }
-            Formula::Not(inner) => self.samples(inner, scale).map(negated),
-            Formula::Consequent { needed: true, .. } if self.watch.fails_consequents() => {
+            CheckedFormula::Not(inner) => self.samples(inner, scale).map(negated),
+            CheckedFormula::Consequent { needed: true, .. } if self.watch.fails_consequents() => {
                 Some(vec![
                     if scale == Scale::Truth {
                         -1.0
@@ -148,10 +148,10 @@ impl<'a> Reader<'a> {
                     self.course.count
                 ])
             }
-            Formula::Consequent { formula, .. } => self.samples(formula, scale),
-            Formula::And(parts) => self.joined(parts, scale, f64::min),
-            Formula::Or(parts) => self.joined(parts, scale, f64::max),
-            Formula::Temporal {
+            CheckedFormula::Consequent { formula, .. } => self.samples(formula, scale),
+            CheckedFormula::And(parts) => self.joined(parts, scale, f64::min),
+            CheckedFormula::Or(parts) => self.joined(parts, scale, f64::max),
+            CheckedFormula::Temporal {
                 operator,
                 from,
                 to,
@@ -167,7 +167,7 @@ impl<'a> Reader<'a> {
 
     fn joined(
         &self,
-        parts: &[Formula],
+        parts: &[CheckedFormula],
         scale: Scale,
         join: fn(f64, f64) -> f64,
     ) -> Option<Vec<f64>> {

@@ -8,15 +8,15 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::check::formulas::formulas_mut;
 use crate::engine::reading::Decisive;
-use crate::model::program::{Literal, PredicateId, Program};
-use crate::temporal::Formula;
+use crate::model::program::{CheckedProgram, Literal, PredicateId};
+use crate::temporal::CheckedFormula;
 
 /// Marks the right sides of `implies` that only make the property harder to pass if they are false.
 /// Returns whether there is one.
 ///
 /// A right side that counts both for and against the property, or through an aggregate, is left
 /// out.
-pub(crate) fn mark_consequents(program: &mut Program, decisive: &Decisive) -> bool {
+pub(crate) fn mark_consequents(program: &mut CheckedProgram, decisive: &Decisive) -> bool {
     let directions = directions(program, decisive);
     let mut found = false;
     for rule in &mut program.rules {
@@ -36,7 +36,10 @@ pub(crate) fn mark_consequents(program: &mut Program, decisive: &Decisive) -> bo
 
 /// Returns for each predicate whether its tuples help the property to pass (`true`), prevent it
 /// (`false`), or both.
-fn directions(program: &Program, decisive: &Decisive) -> BTreeMap<PredicateId, BTreeSet<bool>> {
+fn directions(
+    program: &CheckedProgram,
+    decisive: &Decisive,
+) -> BTreeMap<PredicateId, BTreeSet<bool>> {
     let mut found: BTreeMap<PredicateId, BTreeSet<bool>> = BTreeMap::new();
     let mut waiting = vec![(decisive.predicate, decisive.positive)];
     while let Some((predicate, helps)) = waiting.pop() {
@@ -75,14 +78,16 @@ fn directions(program: &Program, decisive: &Decisive) -> BTreeMap<PredicateId, B
     found
 }
 
-fn mark(formula: &mut Formula, helps: bool, found: &mut bool) {
+fn mark(formula: &mut CheckedFormula, helps: bool, found: &mut bool) {
     match formula {
-        Formula::Compare { .. } | Formula::Truth { .. } => {}
-        Formula::Not(inner) => mark(inner, !helps, found),
-        Formula::And(parts) | Formula::Or(parts) | Formula::Temporal { parts, .. } => {
+        CheckedFormula::Compare { .. } | CheckedFormula::Truth { .. } => {}
+        CheckedFormula::Not(inner) => mark(inner, !helps, found),
+        CheckedFormula::And(parts)
+        | CheckedFormula::Or(parts)
+        | CheckedFormula::Temporal { parts, .. } => {
             parts.iter_mut().for_each(|part| mark(part, helps, found));
         }
-        Formula::Consequent { formula, needed } => {
+        CheckedFormula::Consequent { formula, needed } => {
             // `a implies (b implies c)` asks for `c` only.
             let mut inner = false;
             mark(formula, helps, &mut inner);

@@ -68,21 +68,21 @@ pub(crate) struct Moving {
 /// The shapes of a link in its frame.
 #[derive(Debug)]
 pub(crate) struct Surface {
-    solids: Vec<Solid>,
+    solids: Vec<BoxedCollider>,
 }
 
 /// A shape with the box around it.
 #[derive(Debug)]
-struct Solid {
+struct BoxedCollider {
     around: Aabb,
     collider: Collider,
     /// The faces of a shape that is a convex hull.
-    faces: Option<Vec<Face>>,
+    faces: Option<Vec<HalfSpace>>,
 }
 
 /// The half space behind a face of a hull, in the frame of the hull.
 #[derive(Debug, Clone, Copy)]
-struct Face {
+struct HalfSpace {
     outwards: EngineVector,
     /// Unit: metres.
     offset: Real,
@@ -95,16 +95,16 @@ impl Surface {
             .filter_map(|solid| collider(solid, Owner::Floor, 0.0, 0.0))
             .map(|made| made.build());
         Self {
-            solids: built.map(Solid::new).collect(),
+            solids: built.map(BoxedCollider::new).collect(),
         }
     }
 }
 
-impl Solid {
+impl BoxedCollider {
     fn new(collider: Collider) -> Self {
         let face = |hull: &ConvexPolyhedron, outwards: EngineVector| {
             let along = hull.points().iter().map(|point| outwards.dot(*point));
-            Face {
+            HalfSpace {
                 outwards,
                 offset: along.fold(Real::NEG_INFINITY, Real::max),
             }
@@ -282,7 +282,7 @@ impl<'a> Probe<'a> {
         let from_grasp = grasp.inverse() * self.pose(link, positions);
         let origin = to_vector(&from_grasp.inverse().translation.vector);
         let surface = self.model.links[link].surface();
-        let nearest = |solid: &Solid| {
+        let nearest = |solid: &BoxedCollider| {
             let shape = solid.collider.shape();
             let at = shape
                 .project_point(solid.collider.position(), origin, true)

@@ -4,7 +4,6 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::Isometry3;
 
-use crate::WorldError;
 use crate::description::{Joint, JointKind, RobotModel};
 use crate::gripper::coupling::{Follower, followers, leaders};
 use crate::gripper::further::Further;
@@ -12,6 +11,7 @@ use crate::gripper::gap::{Gap, Probe};
 use crate::gripper::opening::{Gripper, Leader};
 use crate::gripper::sliding::sliding;
 use crate::gripper::table::{Entry, longest_run, travel};
+use crate::{GripperFault, WorldError};
 use actcheck_data::RobotProfile;
 
 /// Intervals of the table. At this number, the error between entries is about 0.01 mm for a finger
@@ -82,9 +82,9 @@ impl Gripper {
             (Err(_), Ok(swapped)) => Ok(swapped.with_sides_swapped()),
             (usual, _) => usual,
         };
-        found.map_err(|what| WorldError::Gripper {
+        found.map_err(|fault| WorldError::Gripper {
             name: profile.urdf.name.to_string(),
-            what,
+            fault,
         })
     }
 
@@ -95,14 +95,14 @@ impl Gripper {
     }
 }
 
-/// Measures the opening on the model. The error is a sentence.
+/// Measures the opening on the model.
 fn measured(
     named: &[usize],
     model: &RobotModel,
     probe: &Probe<'_>,
     n_intervals: usize,
-) -> Result<Gripper, String> {
-    let drive = Drive::find(named, model, probe)?;
+) -> Result<Gripper, GripperFault> {
+    let drive = FingerJoints::find(named, model, probe)?;
     let best = drive
         .ways()
         .into_iter()
@@ -116,17 +116,13 @@ fn measured(
         })
         .max_by(|a, b| travel(&a.0).total_cmp(&travel(&b.0)));
     let Some((table, ends)) = best.filter(|(table, _)| travel(table) > LEAST_TRAVEL_M) else {
-        return Err(
-            "the opening of its gripper can't be measured: no two surfaces of `finger_links` that face each other at \
-             the grasp frame come closer"
-                .to_owned(),
-        );
+        return Err(GripperFault::NoTravel);
     };
     Ok(drive.gripper(&table, &ends))
 }
 
 /// The joints that move the fingers.
-struct Drive<'a> {
+struct FingerJoints<'a> {
     model: &'a RobotModel,
     /// Those that move the left or the right finger.
     leaders: Vec<usize>,
@@ -138,8 +134,12 @@ struct Drive<'a> {
     sides: [usize; 2],
 }
 
-impl<'a> Drive<'a> {
-    fn find(named: &[usize], model: &'a RobotModel, probe: &Probe<'_>) -> Result<Self, String> {
+impl<'a> FingerJoints<'a> {
+    fn find(
+        named: &[usize],
+        model: &'a RobotModel,
+        probe: &Probe<'_>,
+    ) -> Result<Self, GripperFault> {
         let all = leaders(named, model);
         let coupled = followers(&all, model);
         let joints: Vec<usize> = all
@@ -149,7 +149,7 @@ impl<'a> Drive<'a> {
             .collect();
         let moving = probe.moving(&joints);
         if moving.grasp_frame {
-            return Err("its fingers can't be measured: the joints in `finger_joints` move the `grasp_link`".to_owned());
+            return Err(GripperFault::MovesGraspLink);
         }
         let leader_of = |joint: usize| {
             let followed = coupled
@@ -174,17 +174,13 @@ impl<'a> Drive<'a> {
             [Some(left), Some(right)] => [left, right],
             [Some(only), None] | [None, Some(only)] => [only; 2],
             [None, None] => {
-                return Err(
-                    "none of its `finger_joints` moves one of its `finger_links`".to_owned(),
-                );
+                return Err(GripperFault::MovesNoFinger);
             }
         };
         let unlimited = |joint: &&usize| !model.joints[**joint].upper.is_finite();
         if let Some(joint) = all.iter().find(unlimited) {
             let name = &model.joints[*joint].name;
-            return Err(format!(
-                "the opening of its gripper can't be measured: `{name}` has no limits"
-            ));
+            return Err(GripperFault::Unlimited(name.clone()));
         }
         let further = others
             .iter()

@@ -7,7 +7,7 @@ use super::Gripper;
 use super::gap::Probe;
 use crate::convert::{from_pose, to_pose, to_real};
 use crate::description::RobotModel;
-use crate::separation::{Found, Separation, Solids};
+use crate::separation::{Separation, SeparationOutcome, SolidPair};
 
 /// Half of the height of the part of the object between the fingertips: most are at least this
 /// wide. Unit: metres.
@@ -30,7 +30,7 @@ struct Closing<'a> {
 }
 
 /// The fingers around a cylinder, in the grasp frame.
-struct Touch {
+struct CylinderContact {
     /// Distance of both fingers. Unit: metres.
     distance_m: f64,
     /// From the left and the right finger to the cylinder.
@@ -101,7 +101,7 @@ pub(crate) fn pushes(
 
 impl Closing<'_> {
     /// The fingers at an opening, with the cylinder as far from the one as from the other.
-    fn touch(&self, opening_m: f64) -> Option<Touch> {
+    fn touch(&self, opening_m: f64) -> Option<CylinderContact> {
         let mut positions: Vec<f64> = self
             .model
             .joints
@@ -129,7 +129,7 @@ impl Closing<'_> {
         }
         let [left, right] = fingers(f64::midpoint(low, high))?;
         let distance_m = left.distance_m.min(right.distance_m);
-        Some(Touch {
+        Some(CylinderContact {
             distance_m,
             pushes: [left.normal, right.normal],
         })
@@ -147,14 +147,14 @@ impl Closing<'_> {
         let of_solid = form.shapes().filter_map(|(shape, pose)| {
             let solid = from_grasp * from_pose(pose);
             let between = to_pose(&(solid.inverse() * cylinder));
-            match Solids::new(&between, shape.as_support_map()?, &self.cylinder)
+            match SolidPair::new(&between, shape.as_support_map()?, &self.cylinder)
                 .separation(Vector3::x(), FAR_M)
             {
-                Found::Near(found) => Some(Separation {
+                SeparationOutcome::Near(found) => Some(Separation {
                     normal: solid.rotation * found.normal,
                     ..found
                 }),
-                Found::Far(_) | Found::Nothing => None,
+                SeparationOutcome::Far(_) | SeparationOutcome::Nothing => None,
             }
         });
         of_solid.min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))

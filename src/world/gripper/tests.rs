@@ -298,8 +298,8 @@ fn inverse_kinematics_moves_the_joints_that_follow_others() {
     let target = nalgebra::Translation3::new(0.0, 0.0, 0.15) * kinematics.grasp(&start);
     let mut mobility = vec![0.0; start.len()];
     mobility[at("lift")] = 1.0;
-    let found =
-        ik::solve(kinematics, &start, &ik::Reach { target, mobility }).expect("it is within reach");
+    let found = ik::solve(kinematics, &start, &ik::IkRequest { target, mobility })
+        .expect("it is within reach");
     assert!((found[at("lift")] - 0.7).abs() < 2e-3, "{found:?}");
     // The limits of the second stage would stop it at 0.1 m.
     assert!((found[at("second")] - 0.35).abs() < 1e-3, "{found:?}");

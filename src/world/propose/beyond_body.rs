@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
 use super::postures::Search;
-use crate::ik::{self, Reach};
+use crate::ik::{self, IkRequest};
 
 /// Distance of the hand beyond the body from which the base keeps off a table. Unit: metres.
 const ENOUGH_M: f64 = 0.4;
@@ -57,7 +57,7 @@ pub(super) fn add(
                 } else {
                     turned * over
                 };
-                let reach = Reach {
+                let reach = IkRequest {
                     target,
                     mobility: mobility.clone(),
                 };

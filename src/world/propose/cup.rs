@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::body::chain;
-use super::fingers::{Hand, is_called, rounded};
+use super::fingers::{ProposedHand, is_called, rounded};
 use super::frames::corners;
 use crate::description::RobotModel;
 use actcheck_data::{RobotProfile, Suction};
@@ -30,7 +30,7 @@ pub(super) fn find(
     partial: &RobotProfile,
     model: &RobotModel,
     wanted: Option<&str>,
-) -> Option<Hand> {
+) -> Option<ProposedHand> {
     let has_word = |name: &str| WORDS.iter().any(|word| name.to_lowercase().contains(word));
     let is_wanted = |link: usize| wanted.is_none_or(|wanted| is_called(model, link, wanted));
     let named = model
@@ -90,7 +90,7 @@ pub(super) fn find(
             "the area of the lip at 0.6 bar below the air's pressure".to_owned(),
         ),
     ]);
-    Some(Hand {
+    Some(ProposedHand {
         profile,
         palm: *palm,
         notes,

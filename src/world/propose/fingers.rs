@@ -13,9 +13,9 @@ use super::hands::groups;
 use super::row::{across, amid, beside};
 use super::stated::{NoHand, Stated};
 use super::weights::{innermost, powered, tips};
-use crate::Gripper;
 use crate::description::{JointKind, RobotModel};
 use crate::gripper::Probe;
+use crate::{Gripper, GripperFault};
 use actcheck_data::RobotProfile;
 
 /// Most pairs of fingers that are measured.
@@ -28,7 +28,7 @@ const BACKWARDS: f64 = 0.2;
 const WIDE_M: f64 = 0.12;
 
 /// A gripper, as a profile without other roles.
-pub(super) struct Hand {
+pub(super) struct ProposedHand {
     pub(super) profile: RobotProfile,
     /// The link that carries the fingers.
     pub(super) palm: usize,
@@ -48,10 +48,10 @@ pub(super) fn find(
     partial: &RobotProfile,
     model: &RobotModel,
     wanted: Option<&str>,
-) -> Result<Hand, NoHand> {
+) -> Result<ProposedHand, NoHand> {
     let stated = Stated::of(partial, model)?;
     if let (Some(_), Some((palm, _))) = (partial.suction, stated.grasp) {
-        return Ok(Hand {
+        return Ok(ProposedHand {
             profile: partial.clone(),
             palm,
             notes: BTreeMap::new(),
@@ -67,7 +67,7 @@ pub(super) fn find(
             profile.max_opening_m =
                 as_opening(Gripper::find(partial, model, links, grasp)?.widest_m());
         }
-        return Ok(Hand {
+        return Ok(ProposedHand {
             profile,
             palm: grasp.0,
             notes: BTreeMap::new(),
@@ -82,36 +82,32 @@ pub(super) fn find(
         }
         if let (Some(wanted), Some(other)) = (wanted, cup::find(partial, model, None)) {
             let there = &model.links[other.palm].name;
-            return Err(NoHand::Gripper(format!(
-                "no hand has `{wanted}` in a name: there is `{there}`"
-            )));
+            return Err(NoHand::Gripper(GripperFault::UnknownHand {
+                wanted: wanted.to_owned(),
+                cup: there.clone(),
+            }));
         }
-        let what = "no gripper was found: none of its movable joints or their links has a name with `finger`, `grip`, \
-                    `hand`, `jaw`, `knuckle` or `thumb`, and no link one with `suction` or `vacuum`";
-        return Err(NoHand::Gripper(what.to_owned()));
+        return Err(NoHand::Gripper(GripperFault::NoNames));
     }
     let mut rated: Vec<(usize, usize, &BTreeSet<usize>)> = groups
         .iter()
         .map(|(palm, joints)| (rank(model, *palm), *palm, joints))
         .collect();
     if let Some(wanted) = wanted {
-        let hands: Vec<&str> = rated
+        let hands = rated
             .iter()
-            .map(|(_, palm, _)| model.links[*palm].name.as_str())
-            .collect();
-        let unknown = || {
-            NoHand::Gripper(format!(
-                "no hand has `{wanted}` in a name: there are `{}`",
-                hands.join("`, `")
-            ))
-        };
+            .map(|(_, palm, _)| model.links[*palm].name.clone());
+        let unknown = NoHand::Gripper(GripperFault::UnknownHandOf {
+            wanted: wanted.to_owned(),
+            hands: hands.collect(),
+        });
         let chosen: Vec<_> = rated
             .iter()
             .copied()
             .filter(|(_, palm, _)| is_called(model, *palm, wanted))
             .collect();
         if chosen.is_empty() {
-            return Err(unknown());
+            return Err(unknown);
         }
         rated = chosen;
     }
@@ -137,7 +133,7 @@ pub(super) fn find(
             .filter(|palm| chain(model, **palm).len() >= FEWEST_ARM_JOINTS);
         others.map(|palm| model.links[*palm].name.clone()).collect()
     };
-    let best = best.map(|hand| Hand {
+    let best = best.map(|hand| ProposedHand {
         profile: RobotProfile {
             meshes: partial.meshes.clone(),
             ..hand.profile
@@ -166,7 +162,7 @@ pub(super) fn is_called(model: &RobotModel, palm: usize, text: &str) -> bool {
 }
 
 /// Why none of these groups of joints is a gripper.
-fn why_none(model: &RobotModel, groups: &[(usize, usize, &BTreeSet<usize>)]) -> String {
+fn why_none(model: &RobotModel, groups: &[(usize, usize, &BTreeSet<usize>)]) -> GripperFault {
     let joints: Vec<usize> = groups
         .iter()
         .flat_map(|(_, _, joints)| joints.iter().copied())
@@ -179,25 +175,22 @@ fn why_none(model: &RobotModel, groups: &[(usize, usize, &BTreeSet<usize>)]) -> 
         .map(|joint| &model.joints[joint])
     {
         let (lower, upper) = (joint.lower, joint.upper);
-        return format!(
-            "no gripper was found: its joint `{}` can't move, its limits are {lower} and {upper}",
-            joint.name
-        );
+        return GripperFault::Stiff {
+            joint: joint.name.clone(),
+            lower,
+            upper,
+        };
     }
     if joints
         .iter()
         .all(|joint| model.links[joint + 1].solids.is_empty())
     {
-        let links: Vec<&str> = joints
+        let links = joints
             .iter()
-            .map(|joint| model.links[joint + 1].name.as_str())
-            .collect();
-        return format!(
-            "no gripper was found: the links `{}` have no collision shapes",
-            links.join("`, `")
-        );
+            .map(|joint| model.links[joint + 1].name.clone());
+        return GripperFault::NoShapes(links.collect());
     }
-    "no two links of its gripper face each other and come closer".to_owned()
+    GripperFault::NoOpposition
 }
 
 /// Long chains before short ones, then right hands.
@@ -208,7 +201,7 @@ fn rank(model: &RobotModel, palm: usize) -> usize {
 }
 
 /// A measured candidate.
-struct Found {
+struct HandCandidate {
     score: f64,
     named: Vec<usize>,
     links: [usize; 2],
@@ -222,8 +215,8 @@ fn measure(
     stated: &Stated,
     palm: usize,
     joints: &BTreeSet<usize>,
-) -> Option<Hand> {
-    let mut best: Option<Found> = None;
+) -> Option<ProposedHand> {
+    let mut best: Option<HandCandidate> = None;
     for (links, drives) in pairs(model, palm, (joints, stated))
         .into_iter()
         .take(MOST_PAIRS)
@@ -242,11 +235,11 @@ fn measure(
                 let weight = weight
                     * amid(model, &found.named, &further)
                     * across(model, &found.named, &further);
-                let is_better = |found: &Found, best: &Option<Found>| {
+                let is_better = |found: &HandCandidate, best: &Option<HandCandidate>| {
                     best.as_ref()
                         .is_none_or(|best| found.score > best.score + 1e-9)
                 };
-                let found = Found {
+                let found = HandCandidate {
                     score: found.score * weight,
                     ..found
                 };
@@ -262,7 +255,7 @@ fn measure(
                     named: &found.named,
                 };
                 let score = found.score * innermost(&between, found.frame, joints);
-                let found = Found { score, ..found };
+                let found = HandCandidate { score, ..found };
                 if is_better(&found, &best) {
                     best = Some(found);
                 }
@@ -338,7 +331,7 @@ fn measure(
         profile.max_opening_m = as_opening(found.widest_m);
         notes.insert("max_opening_m", "measured at that place".to_owned());
     }
-    Some(Hand {
+    Some(ProposedHand {
         profile,
         palm,
         notes,
@@ -465,7 +458,7 @@ fn rate(
     links: [usize; 2],
     named: &[usize],
     frame: Isometry3<f64>,
-) -> Option<Found> {
+) -> Option<HandCandidate> {
     let profile = driven(bare, model, named);
     let gripper = Gripper::find_coarse(&profile, model, links, (palm, frame)).ok()?;
     // Surfaces at the grasp frame must have been found for both fingers.
@@ -492,7 +485,7 @@ fn rate(
     let both = both * if points_back { BACKWARDS } else { 1.0 };
     let score =
         (0.3 + flat) * both * closes_m.min(WIDE_M) * (0.05 + reach_m) / (1.0 + 10.0 * off_m);
-    Some(Found {
+    Some(HandCandidate {
         score,
         named: named.to_vec(),
         links,

@@ -50,12 +50,12 @@ pub(super) fn corners(part: &Part) -> Vec<Point3<f64>> {
 }
 
 /// The corners of two fingers at one opening, in the palm's frame.
-struct Pair {
+struct FingerCorners {
     left: Vec<Point3<f64>>,
     right: Vec<Point3<f64>>,
 }
 
-impl Pair {
+impl FingerCorners {
     fn new(model: &RobotModel, links: [usize; 2], poses: &[Isometry3<f64>], palm: usize) -> Self {
         let [left, right] = links.map(|link| {
             let from_link = poses[palm].inverse() * poses[link];
@@ -101,7 +101,7 @@ struct Root {
 
 impl Root {
     /// The direction of the fingers.
-    fn ahead(&self, pair: &Pair) -> Vector3<f64> {
+    fn ahead(&self, pair: &FingerCorners) -> Vector3<f64> {
         let to = match self.sides {
             [true, false] => middle(&pair.left),
             [false, true] => middle(&pair.right),
@@ -113,7 +113,7 @@ impl Root {
 
 /// Returns likely grasp frames in the palm's frame. `ends` are the fingers at both ends of their
 /// way.
-fn likely(ends: &[Pair; 2], from: &Root) -> Vec<Isometry3<f64>> {
+fn likely(ends: &[FingerCorners; 2], from: &Root) -> Vec<Isometry3<f64>> {
     let mut found = Vec::new();
     let moved = ends[0].apart() - ends[1].apart();
     for across in [moved, ends[0].apart(), ends[1].apart()] {
@@ -129,7 +129,12 @@ fn likely(ends: &[Pair; 2], from: &Root) -> Vec<Isometry3<f64>> {
 }
 
 /// The frame with its y axis along `across`, and its x axis from a point towards the fingers.
-fn at(pair: &Pair, across: &Vector3<f64>, from: &Root, depth_m: f64) -> Option<Isometry3<f64>> {
+fn at(
+    pair: &FingerCorners,
+    across: &Vector3<f64>,
+    from: &Root,
+    depth_m: f64,
+) -> Option<Isometry3<f64>> {
     let y = aligned(across.try_normalize(1e-4)?);
     // The axis points from the right finger to the left one.
     let y = if y.dot(&pair.apart()) < 0.0 { -y } else { y };
@@ -235,7 +240,8 @@ pub(super) fn frames(
             posture(model, named, *way, 1.0),
             posture(model, named, *way, 0.0),
         ];
-        let ends = ends.map(|positions| Pair::new(model, links, &poses(model, &positions), palm));
+        let ends =
+            ends.map(|positions| FingerCorners::new(model, links, &poses(model, &positions), palm));
         for (weight, frame) in roots
             .iter()
             .flat_map(|(w, root)| likely(&ends, root).into_iter().map(move |f| (*w, f)))

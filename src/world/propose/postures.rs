@@ -10,7 +10,7 @@ use super::GraspFrame;
 use super::beyond_body;
 use super::body::FULL_ARM;
 use crate::description::{JointKind, RobotModel};
-use crate::ik::{self, Reach};
+use crate::ik::{self, IkRequest};
 use crate::layout::Named;
 use crate::{Kinematics, SelfContact, WorldError};
 use actcheck_data::{Pose, RobotProfile, Stream};
@@ -318,7 +318,7 @@ impl Search<'_> {
     fn reach_with(&mut self, target: &Isometry3<f64>, mobility: &[f64]) -> Option<Vec<f64>> {
         // The fingers are alike, so the hand may be turned over.
         let over = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
-        let reaches = [*target, target * over].map(|target| Reach {
+        let reaches = [*target, target * over].map(|target| IkRequest {
             target,
             mobility: mobility.to_vec(),
         });
@@ -345,7 +345,7 @@ impl Search<'_> {
     }
 
     /// Inverse kinematics; an arm of few joints may turn the hand.
-    pub(super) fn solve(&self, seed: &[f64], reach: &Reach) -> Option<Vec<f64>> {
+    pub(super) fn solve(&self, seed: &[f64], reach: &IkRequest) -> Option<Vec<f64>> {
         if reach
             .mobility
             .iter()

@@ -10,7 +10,7 @@ use super::GraspFrame;
 use super::postures::{Search, Standing, hand};
 use crate::WorldError;
 use crate::description::RobotModel;
-use crate::ik::Reach;
+use crate::ik::IkRequest;
 use actcheck_data::RobotProfile;
 
 /// Longest arm that is mounted on the surface. Unit: metres. In front of a table, an arm has a
@@ -109,7 +109,7 @@ fn distances(search: &mut Search<'_>, postures: &[Vec<f64>]) -> Option<[f64; 2]>
 
 /// Whether the arm reaches a place with the hand at this pitch, and lifts it straight up.
 fn takes(search: &Search<'_>, seed: &[f64], place: &Point3<f64>, pitch: f64) -> bool {
-    let at = |place: Point3<f64>| Reach {
+    let at = |place: Point3<f64>| IkRequest {
         target: hand(&place, 0.0, pitch),
         mobility: search.mobility(),
     };

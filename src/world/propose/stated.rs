@@ -6,15 +6,15 @@ use nalgebra::Isometry3;
 
 use super::body::chain;
 use super::fingers::leader;
-use crate::WorldError;
 use crate::description::RobotModel;
 use crate::layout::frame;
+use crate::{GripperFault, WorldError};
 use actcheck_data::RobotProfile;
 
 /// Why no gripper was found.
 pub(super) enum NoHand {
-    /// A sentence.
-    Gripper(String),
+    /// No part of the model is one.
+    Gripper(GripperFault),
     /// The profile names a part that the model does not have.
     Model(WorldError),
 }
@@ -23,9 +23,9 @@ impl NoHand {
     /// The error about a robot's file.
     pub(super) fn named(self, name: &str) -> WorldError {
         match self {
-            Self::Gripper(what) => WorldError::Gripper {
+            Self::Gripper(fault) => WorldError::Gripper {
                 name: name.to_owned(),
-                what,
+                fault,
             },
             Self::Model(error) => error,
         }

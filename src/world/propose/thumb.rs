@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 
 use super::body::chain;
-use super::fingers::{self, Hand};
+use super::fingers::{self, ProposedHand};
 use super::hands::groups;
 use super::stated::NoHand;
 use crate::description::{JointKind, RobotModel};
@@ -33,7 +33,7 @@ const CLEARLY: f64 = 1.1;
 pub(super) fn find(
     partial: &RobotProfile,
     wanted: Option<&str>,
-) -> Result<(RobotModel, Hand), NoHand> {
+) -> Result<(RobotModel, ProposedHand), NoHand> {
     let model = without_roles(partial)?;
     let at_zero = fingers::find(partial, &model, wanted);
     let is_stated = !partial.finger_joints.is_empty()

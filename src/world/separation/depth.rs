@@ -4,7 +4,7 @@
 use nalgebra::Vector3;
 
 use super::simplex::Simplex;
-use super::{Corner, N_STEPS, Separation, Solids};
+use super::{Corner, N_STEPS, Separation, SolidPair};
 
 /// Error of a depth. Unit: metres. Round solids need many steps for less.
 const TOLERANCE_M: f64 = 1e-6;
@@ -75,7 +75,7 @@ impl Face {
 
 /// Finds the direction in which two solids overlap least. `simplex`: corners with the origin in
 /// them or at them. Returns `None` if they are flat.
-pub(super) fn depth(solids: &Solids<'_>, simplex: &Simplex) -> Option<Separation> {
+pub(super) fn depth(solids: &SolidPair<'_>, simplex: &Simplex) -> Option<Separation> {
     let mut all = tetrahedron(solids, simplex)?;
     let mut faces: Vec<Face> = [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]
         .into_iter()
@@ -128,7 +128,7 @@ pub(super) fn depth(solids: &Solids<'_>, simplex: &Simplex) -> Option<Separation
 
 /// Four corners that are not in one plane, with the origin between them or at them, in right-handed
 /// order.
-fn tetrahedron(solids: &Solids<'_>, simplex: &Simplex) -> Option<Vec<Corner>> {
+fn tetrahedron(solids: &SolidPair<'_>, simplex: &Simplex) -> Option<Vec<Corner>> {
     let mut all: Vec<Corner> = simplex.corners().to_vec();
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
     while all.len() < 4 {

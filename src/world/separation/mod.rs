@@ -34,7 +34,7 @@ pub(crate) struct Separation {
 }
 
 /// The outcome of a search.
-pub(crate) enum Found {
+pub(crate) enum SeparationOutcome {
     /// They are farther apart than asked for, along this direction.
     Far(Vector3<f64>),
     Near(Separation),
@@ -43,7 +43,7 @@ pub(crate) enum Found {
 }
 
 /// Two solids of which one point after the other is asked for.
-pub(crate) struct Solids<'a> {
+pub(crate) struct SolidPair<'a> {
     first: &'a dyn SupportMap,
     second: &'a dyn SupportMap,
     /// Pose of the second in the frame of the first.
@@ -58,7 +58,7 @@ struct Corner {
     of: [Vector3<f64>; 2],
 }
 
-impl<'a> Solids<'a> {
+impl<'a> SolidPair<'a> {
     /// Two solids, with the pose of the second in the frame of the first.
     pub(crate) fn new(pose: &Pose, first: &'a dyn SupportMap, second: &'a dyn SupportMap) -> Self {
         let [x, y, z, w] = pose.rotation.to_array().map(f64::from);
@@ -75,11 +75,11 @@ impl<'a> Solids<'a> {
 
     /// Finds their distance if it is less than `far_m`, or how much they overlap. The search begins
     /// with the direction `start`, of length 1.
-    pub(crate) fn separation(&self, start: Vector3<f64>, far_m: f64) -> Found {
+    pub(crate) fn separation(&self, start: Vector3<f64>, far_m: f64) -> SeparationOutcome {
         self.separation_near(start, far_m, &mut Vec::new())
     }
 
-    /// As [`Solids::separation`]. The search begins with these points of both solids, each in the
+    /// As [`SolidPair::separation`]. The search begins with these points of both solids, each in the
     /// frame of its solid, if there are any, and leaves those with which it ended; none if they
     /// overlap.
     pub(crate) fn separation_near(
@@ -87,12 +87,12 @@ impl<'a> Solids<'a> {
         start: Vector3<f64>,
         far_m: f64,
         corners: &mut Vec<[Vector3<f64>; 2]>,
-    ) -> Found {
+    ) -> SeparationOutcome {
         let corner = self.corner(start);
         let apart_m = -corner.point.dot(&start);
         // Solids that were far apart along a direction a moment ago still are.
         if apart_m >= far_m {
-            return Found::Far(start);
+            return SeparationOutcome::Far(start);
         }
         let mut simplex = self.begun(corner, corners);
         corners.clear();
@@ -107,7 +107,7 @@ impl<'a> Solids<'a> {
             let corner = self.corner(normal);
             let apart_m = -corner.point.dot(&normal);
             if apart_m >= far_m {
-                return Found::Far(normal);
+                return SeparationOutcome::Far(normal);
             }
             if apart_m > best.0 {
                 best = (apart_m, normal);
@@ -117,7 +117,7 @@ impl<'a> Solids<'a> {
             let stuck = length_m >= last_m || simplex.has(&corner);
             if converged || stuck {
                 corners.extend(simplex.corners().iter().map(|corner| self.apart(corner)));
-                return Found::Near(Separation {
+                return SeparationOutcome::Near(Separation {
                     distance_m: length_m,
                     normal,
                     points: simplex.points(),
@@ -130,13 +130,13 @@ impl<'a> Solids<'a> {
             }
         }
         if best.0 > -TOLERANCE_M {
-            return Found::Near(Separation {
+            return SeparationOutcome::Near(Separation {
                 distance_m: best.0.max(0.0),
                 normal: best.1,
                 points: simplex.points(),
             });
         }
-        depth::depth(self, &simplex).map_or(Found::Nothing, Found::Near)
+        depth::depth(self, &simplex).map_or(SeparationOutcome::Nothing, SeparationOutcome::Near)
     }
 
     /// The simplex of some points of both solids, each in the frame of its solid, or of a corner if
@@ -200,10 +200,10 @@ mod tests {
     }
 
     fn found(b_in_a: &Isometry3<f64>, [a, b]: [&dyn Shape; 2]) -> Option<Separation> {
-        let solids = Solids::new(&to_pose(b_in_a), a.as_support_map()?, b.as_support_map()?);
+        let solids = SolidPair::new(&to_pose(b_in_a), a.as_support_map()?, b.as_support_map()?);
         match solids.separation(Vector3::x(), FAR_M) {
-            Found::Near(found) => Some(found),
-            Found::Far(_) | Found::Nothing => None,
+            SeparationOutcome::Near(found) => Some(found),
+            SeparationOutcome::Far(_) | SeparationOutcome::Nothing => None,
         }
     }
 
@@ -260,7 +260,7 @@ mod tests {
             let b_in_a = pose(trial, 0.09);
             let found = found(&b_in_a, [&hull, &cylinder])
                 .unwrap_or_else(|| panic!("trial {trial}: nothing"));
-            let solids = Solids::new(&to_pose(&b_in_a), &hull, &cylinder);
+            let solids = SolidPair::new(&to_pose(&b_in_a), &hull, &cylinder);
             let along_m = -solids.corner(found.normal).point.dot(&found.normal);
             let between = found.points[1] - found.points[0];
             assert!(
@@ -352,7 +352,7 @@ mod tests {
             translation: parry3d::math::Vector::new(0.08137189, 9.995261e-11, 0.034244776),
             ..Pose::IDENTITY
         };
-        let found = Solids::new(&pose, &hull, &cylinder).separation(Vector3::x(), 0.5);
-        assert!(matches!(found, Found::Nothing));
+        let found = SolidPair::new(&pose, &hull, &cylinder).separation(Vector3::x(), 0.5);
+        assert!(matches!(found, SeparationOutcome::Nothing));
     }
 }

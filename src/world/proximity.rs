@@ -42,7 +42,7 @@ const WHOLE_TICKS: u32 = 30;
 
 /// The distances of the robot's links from everything.
 #[derive(Default)]
-pub(super) struct Room {
+pub(super) struct ProximityCache {
     /// Distances of links from the floor and all static objects, by the link's index.
     fixed: Vec<Option<Measured>>,
     /// Distances of links from all other objects at rest.
@@ -108,7 +108,7 @@ struct Moment {
 impl World {
     /// Takes only these shortcuts from now on: for comparisons.
     pub fn take_shortcuts(&mut self, shortcuts: Shortcuts) {
-        self.room.shortcuts = shortcuts;
+        self.proximity.shortcuts = shortcuts;
     }
 
     /// Leaves all ticks to the engine, with the whole robot, also those in which the robot touches
@@ -120,9 +120,9 @@ impl World {
     /// Sets the engine's substeps for a tick.
     pub(super) fn set_substeps(&mut self, reach: Reach) {
         let substeps = match reach {
-            Reach::Nothing if self.room.shortcuts.few_substeps => self.substeps.div_ceil(2),
+            Reach::Nothing if self.proximity.shortcuts.few_substeps => self.substeps.div_ceil(2),
             // Light fingers whose many pieces press on each other would fly apart.
-            Reach::Hand if self.room.shortcuts.few_substeps && !self.room.pieces_meet => {
+            Reach::Hand if self.proximity.shortcuts.few_substeps && !self.proximity.pieces_meet => {
                 self.substeps.div_ceil(2)
             }
             _ => self.substeps,
@@ -133,17 +133,17 @@ impl World {
     /// Returns the number of ticks so far in which the robot could touch nothing, with everything
     /// else at rest; nothing, with moving objects; movable objects with its hand; and everything.
     pub fn ticks_by_reach(&self) -> [u64; 4] {
-        self.room.ticks
+        self.proximity.ticks
     }
 
     /// Returns whether the robot moved through free space in the last tick, without the engine.
     pub fn moved_freely(&self) -> bool {
-        self.room.reach == Reach::Nothing
+        self.proximity.reach == Reach::Nothing
     }
 
     /// Returns whether the engine moved only the robot's hand in the last tick.
     pub fn moved_hand_alone(&self) -> bool {
-        self.room.reach == Reach::Hand
+        self.proximity.reach == Reach::Hand
     }
 
     /// Returns whether the engine swept fast shapes in the last tick, so that they pass through
@@ -153,36 +153,36 @@ impl World {
     }
 
     /// Returns the reach of the robot, with its links at these poses, in the next tick.
-    pub(super) fn find_room(&mut self, poses: Vec<Isometry3<f64>>) -> Reach {
-        let mut room = std::mem::take(&mut self.room);
-        room.sweeps = true;
-        let reach = if room.shortcuts == Shortcuts::NONE {
+    pub(super) fn update_proximity(&mut self, poses: Vec<Isometry3<f64>>) -> Reach {
+        let mut cache = std::mem::take(&mut self.proximity);
+        cache.sweeps = true;
+        let reach = if cache.shortcuts == Shortcuts::NONE {
             Reach::All
         } else {
-            self.reach(&mut room, poses)
+            self.reach(&mut cache, poses)
         };
         self.engine.integration_parameters.max_ccd_substeps =
-            usize::from(room.sweeps || !room.shortcuts.few_sweeps);
-        let reach = room.shortcuts.limit(reach);
+            usize::from(cache.sweeps || !cache.shortcuts.few_sweeps);
+        let reach = cache.shortcuts.limit(reach);
         if reach != Reach::Nothing {
             self.leave_out_idle(reach);
         }
-        room.reach = match reach {
+        cache.reach = match reach {
             // A light arm gives way to its hand's contacts within the step.
             Reach::Hand if self.robot.is_light || self.robot.is_loaded => Reach::All,
             reach => reach,
         };
-        room.ticks[room.reach as usize] += 1;
-        self.room = room;
-        self.room.reach
+        cache.ticks[cache.reach as usize] += 1;
+        self.proximity = cache;
+        self.proximity.reach
     }
 
     /// Lets the engine move the whole robot for a while.
     pub(super) fn need_whole(&mut self) {
-        self.room.whole_ticks = WHOLE_TICKS;
+        self.proximity.whole_ticks = WHOLE_TICKS;
     }
 
-    fn reach(&self, room: &mut Room, poses: Vec<Isometry3<f64>>) -> Reach {
+    fn reach(&self, cache: &mut ProximityCache, poses: Vec<Isometry3<f64>>) -> Reach {
         if !self.sliding.is_empty() || self.sealed().is_some() {
             return Reach::All;
         }
@@ -192,12 +192,12 @@ impl World {
             .map(|object| self.rests(object))
             .collect();
         let n_links = self.robot.bodies.len();
-        if rest != room.rest {
-            room.resting.clear();
+        if rest != cache.rest {
+            cache.resting.clear();
         }
-        room.fixed.resize(n_links, None);
-        room.resting.resize(n_links, None);
-        room.pairs.resize(self.link_pairs.iter().count(), None);
+        cache.fixed.resize(n_links, None);
+        cache.resting.resize(n_links, None);
+        cache.pairs.resize(self.link_pairs.iter().count(), None);
         let (positions, velocities) = (&self.robot.positions, &self.robot.velocities);
         let spans = self
             .robot
@@ -215,36 +215,36 @@ impl World {
         } else {
             Reach::Apart
         };
-        room.rest = rest;
-        room.sweeps = self.fast_objects_meet_fixed(&room.rest);
+        cache.rest = rest;
+        cache.sweeps = self.fast_objects_meet_fixed(&cache.rest);
         for link in 0..n_links {
-            if !self.is_clear_of_fixed(room, link, &now) {
-                room.sweeps |= self.links_outrun_contacts(&now);
+            if !self.is_clear_of_fixed(cache, link, &now) {
+                cache.sweeps |= self.links_outrun_contacts(&now);
                 return Reach::All;
             }
             if reach < Reach::All {
-                reach = reach.max(self.reach_of_link(room, link, &now));
+                reach = reach.max(self.reach_of_link(cache, link, &now));
             }
         }
         if reach == Reach::All {
             return reach;
         }
-        if room.between.is_empty() {
-            room.between = self
+        if cache.between.is_empty() {
+            cache.between = self
                 .link_pairs
                 .iter()
                 .map(|(first, second)| self.joints_between(first, second))
                 .collect();
-            room.kept_m = self
+            cache.kept_m = self
                 .link_pairs
                 .iter()
-                .zip(&mut room.pairs)
+                .zip(&mut cache.pairs)
                 .map(|(pair, known)| self.kept_m(pair, known, &now.poses))
                 .collect();
         }
-        reach = reach.max(self.reach_between_links(room, &now));
-        if reach == Reach::Hand && room.whole_ticks > 0 {
-            room.whole_ticks -= 1;
+        reach = reach.max(self.reach_between_links(cache, &now));
+        if reach == Reach::Hand && cache.whole_ticks > 0 {
+            cache.whole_ticks -= 1;
             return Reach::All;
         }
         reach
@@ -259,7 +259,7 @@ impl World {
     }
 
     /// Returns whether a link can't meet the floor or a static object in the tick.
-    fn is_clear_of_fixed(&self, room: &mut Room, link: usize, now: &Moment) -> bool {
+    fn is_clear_of_fixed(&self, cache: &mut ProximityCache, link: usize, now: &Moment) -> bool {
         let Some(ball) = self.robot.balls[link] else {
             return true;
         };
@@ -268,8 +268,8 @@ impl World {
             return true;
         }
         let measure = || self.gap_of_link(link, &|object| object.fixed, true);
-        has_room(
-            &mut room.fixed[link],
+        is_clear_within(
+            &mut cache.fixed[link],
             measure,
             &ball,
             (&now.poses[link], self.ahead(link, &ball, now)),
@@ -306,7 +306,7 @@ impl World {
         Some(linear.norm() + angular.norm() * ball.radius)
     }
 
-    fn reach_of_link(&self, room: &mut Room, link: usize, now: &Moment) -> Reach {
+    fn reach_of_link(&self, cache: &mut ProximityCache, link: usize, now: &Moment) -> Reach {
         let Some(ball) = self.robot.balls[link] else {
             return Reach::Nothing;
         };
@@ -315,11 +315,11 @@ impl World {
             return Reach::Nothing;
         }
         let ahead = self.ahead(link, &ball, now);
-        let rest = &room.rest;
+        let rest = &cache.rest;
         let rests = |object: &Object| !object.fixed && self.is_in(object, rest);
         let measure = || self.gap_of_link(link, &rests, false);
-        let clear = has_room(
-            &mut room.resting[link],
+        let clear = is_clear_within(
+            &mut cache.resting[link],
             measure,
             &ball,
             (&now.poses[link], ahead),
@@ -461,8 +461,8 @@ impl World {
         Some((pose * other.middle - one.middle).norm() - one.radius - other.radius - ROUNDING_M)
     }
 
-    fn reach_between_links(&self, room: &mut Room, now: &Moment) -> Reach {
-        room.pieces_meet = false;
+    fn reach_between_links(&self, cache: &mut ProximityCache, now: &Moment) -> Reach {
+        cache.pieces_meet = false;
         if self.link_pairs.pass {
             return Reach::Nothing;
         }
@@ -470,9 +470,9 @@ impl World {
         let pairs = self
             .link_pairs
             .iter()
-            .zip(&mut room.pairs)
-            .zip(&room.between)
-            .zip(&room.kept_m);
+            .zip(&mut cache.pairs)
+            .zip(&cache.between)
+            .zip(&cache.kept_m);
         for ((((first, second), known), joints), kept_m) in pairs {
             let (Some(one), Some(other)) = (self.robot.balls[first], self.robot.balls[second])
             else {
@@ -507,7 +507,7 @@ impl World {
                 .as_ref()
                 .is_some_and(|hand| hand.has(first) && hand.has(second));
             reach = reach.max(if in_hand { Reach::Hand } else { Reach::All });
-            room.pieces_meet |= in_hand
+            cache.pieces_meet |= in_hand
                 && [first, second]
                     .iter()
                     .any(|link| self.robot.model.links[*link].has_many_pieces());
@@ -587,7 +587,7 @@ impl World {
 
 /// Returns whether more of a distance is left than a link at a pose can move in the tick. It is
 /// measured again if the known one does not suffice.
-fn has_room(
+fn is_clear_within(
     known: &mut Option<Measured>,
     measure: impl Fn() -> f64,
     ball: &Ball,

@@ -28,7 +28,7 @@ const CARRIER_AXES: usize = 3;
 
 /// The part of the robot that the engine moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Share {
+pub(super) enum Ownership {
     /// No link.
     Nothing,
     /// The hand with its fingers.
@@ -90,21 +90,21 @@ const COUPLED_ITERATIONS: usize = 8;
 
 impl Robot {
     /// Returns whether the engine moves a joint.
-    pub(super) fn shares(&self, joint: usize) -> bool {
-        match self.share {
-            Share::Nothing => false,
-            Share::Hand => self.hand.as_ref().is_some_and(|hand| hand.moves(joint)),
-            Share::Whole => true,
+    pub(super) fn engine_moves(&self, joint: usize) -> bool {
+        match self.ownership {
+            Ownership::Nothing => false,
+            Ownership::Hand => self.hand.as_ref().is_some_and(|hand| hand.moves(joint)),
+            Ownership::Whole => true,
         }
     }
 
     /// Gives this part of the robot to the engine, in the robot's state, and takes the others from
     /// it.
-    pub(super) fn hand_over(&mut self, engine: &mut PhysicsWorld, share: Share) {
-        if self.share == share {
+    pub(super) fn hand_over(&mut self, engine: &mut PhysicsWorld, ownership: Ownership) {
+        if self.ownership == ownership {
             return;
         }
-        (self.share, self.carrier) = (share, None);
+        (self.ownership, self.carrier) = (ownership, None);
         if let Some(body) = self.bodies.get(1) {
             // The link of the hand is a root or follows one, as all others do.
             engine
@@ -118,10 +118,10 @@ impl Robot {
         }
         let poses = self.kinematics.links(&self.positions);
         for (idx, (body, pose)) in self.bodies.iter().zip(&poses).enumerate().skip(1) {
-            let given = match share {
-                Share::Nothing => false,
-                Share::Hand => self.hand.as_ref().is_some_and(|hand| hand.has(idx)),
-                Share::Whole => true,
+            let given = match ownership {
+                Ownership::Nothing => false,
+                Ownership::Hand => self.hand.as_ref().is_some_and(|hand| hand.has(idx)),
+                Ownership::Whole => true,
             };
             let kind = if given {
                 RigidBodyType::Dynamic
@@ -133,13 +133,13 @@ impl Robot {
                 body.set_position(to_pose(pose), false);
             }
         }
-        self.insert_share(engine);
+        self.insert_owned_joints(engine);
         self.put_state(engine);
     }
 
-    /// Inserts the joints of the engine's share.
-    fn insert_share(&mut self, engine: &mut PhysicsWorld) {
-        if let (Share::Hand, Some(hand)) = (self.share, &self.hand) {
+    /// Inserts the joints that the engine moves.
+    fn insert_owned_joints(&mut self, engine: &mut PhysicsWorld) {
+        if let (Ownership::Hand, Some(hand)) = (self.ownership, &self.hand) {
             let locked = JointAxesMask::LIN_Z | JointAxesMask::ANG_Y | JointAxesMask::ANG_Z;
             let joint = GenericJoint::new(locked);
             self.carrier =
@@ -148,19 +148,19 @@ impl Robot {
                     .insert(self.bodies[0], self.bodies[hand.link], joint, true);
         }
         for idx in 0..self.motors.len() {
-            if self.shares(idx)
+            if self.engine_moves(idx)
                 && let Some(handle) =
                     insert_joint(engine, &self.model.joints[idx], idx, &self.bodies)
             {
                 self.motors[idx].joint = handle;
             }
         }
-        self.finish_share(engine);
+        self.finish_owned_joints(engine);
     }
 
-    /// Finishes the engine's share once its joints are inserted.
-    pub(super) fn finish_share(&self, engine: &mut PhysicsWorld) {
-        let Some(first) = self.first_shared() else {
+    /// Finishes the joints that the engine moves, once all are inserted.
+    pub(super) fn finish_owned_joints(&self, engine: &mut PhysicsWorld) {
+        let Some(first) = self.first_owned() else {
             return;
         };
         let Some((multibody, _)) = engine.multibody_joints.get_mut(first) else {
@@ -169,7 +169,7 @@ impl Robot {
         // This determines whether the root is fixed, and with it the index of each joint's
         // coordinate.
         multibody.forward_kinematics(&engine.bodies, true);
-        if self.share == Share::Hand {
+        if self.ownership == Ownership::Hand {
             multibody
                 .armature_mut()
                 .rows_mut(0, CARRIER_AXES)
@@ -180,7 +180,7 @@ impl Robot {
             .motors
             .iter()
             .enumerate()
-            .filter(|(idx, _)| self.shares(*idx))
+            .filter(|(idx, _)| self.engine_moves(*idx))
             .map(|(_, motor)| motor)
         {
             let Some((multibody, link)) = engine.multibody_joints.get_mut(motor.joint) else {
@@ -197,11 +197,11 @@ impl Robot {
     }
 
     /// Returns a joint of the engine's multibody, or `None` if there is none.
-    fn first_shared(&self) -> Option<MultibodyJointHandle> {
-        match self.share {
-            Share::Nothing => None,
-            Share::Hand => self.carrier,
-            Share::Whole => self.motors.first().map(|motor| motor.joint),
+    fn first_owned(&self) -> Option<MultibodyJointHandle> {
+        match self.ownership {
+            Ownership::Nothing => None,
+            Ownership::Hand => self.carrier,
+            Ownership::Whole => self.motors.first().map(|motor| motor.joint),
         }
     }
 
@@ -221,7 +221,7 @@ impl Robot {
             .joints
             .iter()
             .enumerate()
-            .filter(|(idx, _)| self.shares(*idx))
+            .filter(|(idx, _)| self.engine_moves(*idx))
         {
             let Some((leader, factor, offset)) = joint.mimic else {
                 continue;
@@ -252,23 +252,23 @@ impl Robot {
         }
     }
 
-    /// Sets the joints of the engine's share to the robot's state.
+    /// Sets the joints that the engine moves to the robot's state.
     pub(super) fn put_state(&self, engine: &mut PhysicsWorld) {
-        let Some(first) = self.first_shared() else {
+        let Some(first) = self.first_owned() else {
             return;
         };
         let poses = self.kinematics.links(&self.positions);
         let dofs: Vec<Option<(usize, f64)>> = (0..self.motors.len())
             .map(|idx| {
                 let (multibody, link) = engine.multibody_joints.get(self.motors[idx].joint)?;
-                let link = multibody.link(link).filter(|_| self.shares(idx))?;
+                let link = multibody.link(link).filter(|_| self.engine_moves(idx))?;
                 Some((
                     link.assembly_id(),
                     f64::from(link.joint.coords()[self.motors[idx].axis as usize]),
                 ))
             })
             .collect();
-        if let (Share::Hand, Some(hand)) = (self.share, &self.hand) {
+        if let (Ownership::Hand, Some(hand)) = (self.ownership, &self.hand) {
             self.turn_carrier(engine, &poses[hand.link], &UnitQuaternion::identity());
         }
         let Some((multibody, _)) = engine.multibody_joints.get_mut(first) else {
@@ -318,7 +318,7 @@ impl Robot {
     /// Reads the state of the joints that the engine moves.
     pub(super) fn take_state(&mut self, engine: &PhysicsWorld) {
         for idx in 0..self.motors.len() {
-            if !self.shares(idx) {
+            if !self.engine_moves(idx) {
                 continue;
             }
             let motor = &self.motors[idx];
@@ -365,7 +365,7 @@ impl Robot {
         }
     }
 
-    /// Lets the engine move the links that are not in its share to where the joints are, in its
+    /// Lets the engine move the links that it does not own to where the joints are, in its
     /// next step.
     pub(super) fn lead_links(&self, engine: &mut PhysicsWorld) {
         let poses = self.kinematics.links(&self.positions);
@@ -384,7 +384,7 @@ impl Robot {
 
     /// Moves all links and their colliders to where the joints are, at once.
     pub(super) fn place_links(&self, engine: &mut PhysicsWorld) {
-        if self.share != Share::Nothing {
+        if self.ownership != Ownership::Nothing {
             return self.put_state(engine);
         }
         let poses = self.kinematics.links(&self.positions);
