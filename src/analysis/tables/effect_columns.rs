@@ -1,5 +1,5 @@
 //! The columns of realised noise and of effects, which come from a run's choices and its trace.
-//! They are missing in runs of earlier versions whose trace can't be read.
+//! They are missing in runs whose trace can't be read.
 
 use crate::tables::cell::Cell;
 use crate::tables::columns::{Column, ColumnRole, number, text};
