@@ -6,6 +6,7 @@ use std::sync::Arc;
 use actcheck::base::Source;
 use actcheck::config::{self, Overrides};
 use actcheck::data::{BodyState, MovingPart, ObjectModel, PartJoint, Pose, Role, SceneObject};
+use actcheck::history::History;
 use actcheck::world::{GRAVITY, Poison, World, build};
 
 use crate::physics::{block, body, object, scene};
@@ -258,6 +259,15 @@ fn a_campaign_with_a_cabinet_knows_its_parts() {
         found.contains("cabinet_1_drawer") && found.contains("actions#Drawer"),
         "{found}"
     );
+    // The trace keeps them, too.
+    let history = History::open_to_read(&folder.path().join(".actcheck")).unwrap();
+    let trace = history.states("@last").unwrap();
+    let parts = trace.snapshots.iter().map(|state| {
+        let parts = state.bodies.iter().filter_map(|body| body.part.as_ref());
+        parts.filter(|(whole, _)| whole == "cabinet_1").count()
+    });
+    assert!(parts.clone().count() >= 2 && parts.clone().all(|count| count == 3));
+    drop(history);
     let replayed = actcheck(folder.path(), &["replay", "@last"]);
     assert_eq!(
         replayed.status.code(),

@@ -134,7 +134,7 @@ fn body(id: &str, category: &str, fixed: bool, foot_m: [f64; 3], size_m: [f64; 3
         touches: Vec::new(),
         rests_on: Vec::new(),
         asleep: false,
-        size_m: Some(size_m),
+        size_m,
         grasp_distance_m: None,
         part: None,
         left_world: false,

@@ -82,7 +82,7 @@ fn contact(a: &str, b: &str, start_secs: f64, max_force_n: f64) -> ContactEpisod
         start_secs,
         end_secs: start_secs + 0.5,
         max_force_n,
-        point_m: None,
+        point_m: [0.8, 0.0, 0.35],
     }
 }
 
@@ -128,7 +128,7 @@ fn things_around_the_target_are_placed_along_the_approach() {
     let found = around(&trace);
     let of = |id: &str| found.iter().find(|thing| thing.object == id).unwrap();
     let place = |thing: &Surrounding| (thing.beyond_m.unwrap(), thing.left_m.unwrap());
-    // Without the point of the contact: the point of the table that is nearest to the base.
+    // Of furniture, the place of the contact counts.
     assert_eq!(place(of("coffee_table_1")), (-0.2, 0.0));
     assert_eq!(place(of("mug_1")), (0.1, 0.1));
     let mug = of("mug_1");
@@ -148,7 +148,7 @@ fn things_around_the_target_are_placed_along_the_approach() {
         (None, "platform")
     );
     assert!(!found.iter().any(|thing| thing.object == "glass_1"));
-    trace.actions[0].contacts[1].point_m = Some([0.9, -0.2, 0.5]);
+    trace.actions[0].contacts[1].point_m = [0.9, -0.2, 0.5];
     let known = around(&trace);
     assert_eq!(
         place(

@@ -65,7 +65,7 @@ fn body(id: &str, asleep: bool, choices: &mut Choices) -> BodyState {
             &["coffee_table_1"]
         }),
         asleep,
-        size_m: Some(three(choices, 0.05, 0.2)),
+        size_m: three(choices, 0.05, 0.2),
         grasp_distance_m: (!fixed).then(|| single(choices, -0.01, 1.0)),
         part: None,
         left_world: false,
@@ -132,7 +132,7 @@ fn contact(a: &str, b: &str, start_secs: f64, max_force_n: f64) -> ContactEpisod
         start_secs,
         end_secs: start_secs + 0.5,
         max_force_n,
-        point_m: Some([0.1, start_secs, 0.7]),
+        point_m: [0.1, start_secs, 0.7],
     }
 }
 

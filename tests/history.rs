@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use actcheck::base::{Diagnostics, Judgement, Outcome, RunFacts, Source, Term, digest_of, names};
 use actcheck::data::{
-    ActionEnd, Camera, Choice, ChoiceKind, ObjectModel, Odometry, Physics, Pose, Quality,
+    ActionEnd, Camera, Choice, ChoiceKind, CupState, ObjectModel, Odometry, Physics, Pose, Quality,
     RobotProfile, RobotStart, Role, Scene, SceneObject, Sensing,
 };
 use actcheck::facts::extract;
@@ -227,7 +227,7 @@ pub fn sample_campaign(id: &str, minute: u32) -> CampaignRecord {
         started: format!("2026-08-01T12:{minute:02}:00Z"),
         program_version: "0.1.0".to_owned(),
         program_digest: digest_of("program"),
-        physics: Some(1),
+        physics: 1,
     }
 }
 
@@ -287,18 +287,53 @@ fn a_stored_run_keeps_its_facts_trace_and_choices() {
     assert_eq!(facts_as_terms(&facts), facts_as_terms(&record.facts));
 }
 
-/// Version 3 of the trace files has the indices of candidates without their names.
 #[test]
-fn traces_of_the_previous_version_are_read() {
+fn a_trace_of_another_format_is_refused() {
     let (folder, history) = filled();
     let file = folder.path().join("history/traces/z2-4.trace");
     let mut bytes = std::fs::read(&file).unwrap();
-    assert_eq!(&bytes[..8], b"actrace4");
-    bytes[7] = b'3';
+    assert_eq!(&bytes[..8], b"actrace5");
+    bytes[7] = b'4';
     std::fs::write(&file, bytes).unwrap();
-    let record = sample_run("z2", 3);
+    let faults = history.trace("z2-4").unwrap_err();
+    let said: Vec<String> = faults.iter().map(|fault| fault.message.clone()).collect();
+    assert_eq!(said.len(), 1, "{said:?}");
+    assert!(
+        said[0].ends_with("the trace of run z2-4: its format is 4, this program reads format 5"),
+        "{said:?}"
+    );
+}
+
+/// Regression: a trace did not keep which objects are parts of others, although facts name them.
+#[test]
+fn a_stored_run_keeps_parts_departures_and_suction_cups() {
+    let folder = tempfile::tempdir().unwrap();
+    let history = History::open(&folder.path().join("history")).unwrap();
+    let mut record = sample_run("z2", 3);
+    for (number, state) in record.trace.snapshots.iter_mut().enumerate() {
+        let number = number as f64;
+        state.bodies[1].part = Some(("coffee_table_1".to_owned(), 0.125 * number));
+        state.bodies[2].left_world = number > 0.0;
+        state.robot.cup = Some(CupState {
+            force_n: 60.0,
+            pull_n: 2.5 * number,
+        });
+    }
+    record.facts = extract(&record.trace);
+    history.begin_campaign(&sample_campaign("z2", 1)).unwrap();
+    history.commit(&record).unwrap();
+    drop(history);
+    let history = History::open_existing(&folder.path().join("history")).unwrap();
     assert_eq!(history.trace("z2-4").unwrap(), record.trace);
-    assert_eq!(history.choices("z2-4").unwrap(), record.choices);
+    let facts = history.facts("z2-4", false).unwrap();
+    assert_eq!(facts_as_terms(&facts), facts_as_terms(&record.facts));
+    let named = |local: &str| Term::iri(names::w(local));
+    let has = |local: &str| {
+        facts_as_terms(&facts)[1]
+            .iter()
+            .any(|[_, p, _]| *p == named(local))
+    };
+    assert!(["partOf", "jointPosition", "leftWorld", "pull"].map(has) == [true; 4]);
 }
 
 #[test]
@@ -781,17 +816,22 @@ fn a_second_owner_is_refused_without_changes() {
 }
 
 #[test]
-fn a_history_of_a_newer_program_is_not_changed() {
+fn a_history_of_another_format_is_not_changed() {
     let (folder, history) = filled();
     drop(history);
     let dir = folder.path().join("history");
+    for (version, help) in [("5", "update actcheck"), ("3", "no release wrote")] {
+        std::fs::write(dir.join("VERSION"), format!("actcheck history {version}\n")).unwrap();
+        for fault in [code(History::open(&dir)), code(History::open_to_read(&dir))] {
+            assert!(
+                fault.starts_with("H004")
+                    && fault.contains(&format!("has format {version}; "))
+                    && fault.contains(help),
+                "{fault}"
+            );
+        }
+    }
     std::fs::write(dir.join("VERSION"), "actcheck history 4\n").unwrap();
-    let fault = code(History::open(&dir));
-    assert!(
-        fault.starts_with("H004") && fault.contains("update actcheck"),
-        "{fault}"
-    );
-    std::fs::write(dir.join("VERSION"), "actcheck history 1\n").unwrap();
     assert_eq!(
         History::open_existing(&dir)
             .unwrap()

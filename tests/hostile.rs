@@ -233,7 +233,7 @@ fn no_command_follows_a_link_of_a_history() {
     // A folder of its own, with nothing but a version and links, as in a small pull request.
     let stranger = Stranger::new();
     std::fs::create_dir(stranger.history()).unwrap();
-    std::fs::write(stranger.history().join("VERSION"), "actcheck history 1\n").unwrap();
+    std::fs::write(stranger.history().join("VERSION"), "actcheck history 4\n").unwrap();
     stranger.link("configs/.actcheck/seal", "");
     assert!(stranger.unchanged(&COMMANDS, "only seal")[12].contains("H027"));
 }

@@ -136,29 +136,6 @@ fn the_last_hold_before_an_interval_and_the_length_of_an_interval_are_known() {
     assert!(!holds("lasts(<hold/2>, ?d), ?d > 0.5"));
 }
 
-#[test]
-fn runs_of_earlier_versions_break_properties_that_read_holds() {
-    let rules = rules("violation(?i) :- hold_interval(?i, _), lasts(?i, ?d), ?d < 0.5 .");
-    let mut facts = Facts::new();
-    assert_eq!(rules.judge(&facts).outcome, Outcome::Passed);
-    let action = |local: &str| {
-        [
-            Term::iri(names::w("action")),
-            Term::iri(names::w(local)),
-            Term::Boolean(true),
-        ]
-    };
-    facts.add(When::During, action("robotMeasured"));
-    let decision = rules.judge(&facts);
-    assert_eq!(decision.outcome, Outcome::Broken);
-    assert!(
-        format!("{decision:?}").contains("the holds and motions of the action were not recorded"),
-        "{decision:?}"
-    );
-    facts.add(When::During, action("intervalsRecorded"));
-    assert_eq!(rules.judge(&facts).outcome, Outcome::Passed);
-}
-
 /// The intervals of a simulated pick, for queries.
 #[test]
 fn queries_see_holds_motions_and_phases_in_the_history() {

@@ -163,16 +163,16 @@ fn a_campaign_ends_in_compressed_tables_with_the_same_statements() {
     );
 }
 
-/// An earlier program does not know journals: it listed the other runs only.
+/// Otherwise a lost journal would not be noticed.
 #[test]
-fn programs_that_know_no_journal_refuse_a_history_with_one() {
+fn a_history_is_marked_while_it_has_a_journal() {
     let (_folder, left) = killed(2);
     let version = || std::fs::read_to_string(left.join("VERSION")).unwrap();
-    assert_eq!(version(), "actcheck history 2\n");
+    assert_eq!(version(), "actcheck history 4 journal\n");
     drop(History::open_to_read(&left).unwrap());
-    assert_eq!(version(), "actcheck history 2\n");
+    assert_eq!(version(), "actcheck history 4 journal\n");
     drop(History::open(&left).unwrap());
-    assert_eq!(version(), "actcheck history 1\n");
+    assert_eq!(version(), "actcheck history 4\n");
     drop(History::open(&left).unwrap());
     assert_eq!(runs(&History::open_to_read(&left).unwrap()), ["k-1", "k-2"]);
 }

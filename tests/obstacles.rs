@@ -128,8 +128,7 @@ fn in_the_way(scene: &Scene) -> Vec<(String, String)> {
     of_role(scene, Role::Obstacle).flat_map(near).collect()
 }
 
-/// In 15 of the 70 scenes of an earlier version, an obstacle was on a location, in 7 on the goal
-/// itself: the robot could only report that its goal was occupied.
+/// Regression: in 15 of 70 scenes, an obstacle was on a location, in 7 on the goal itself: the robot could only report that its goal was occupied.
 #[test]
 fn no_obstacle_of_the_shipped_task_is_on_a_location() {
     let shipped = scenes(&space_of(&root().join("configs/pick_and_place.toml")), 200);
@@ -253,8 +252,7 @@ fn a_record_of_a_scene_with_obstacles_gives_the_same_scene() {
     }
 }
 
-/// Cases and runs of an earlier version may have an obstacle on a location. Their scenes stay as
-/// they are.
+/// A case may put an obstacle on a location.
 #[test]
 fn a_given_position_is_used_even_if_it_blocks_a_location() {
     let free = space_of(&root().join("configs/pick_and_place.toml"));

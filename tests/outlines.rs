@@ -124,7 +124,7 @@ fn outlines_answer_as_whole_runs_do() {
         let [whole, outlines] = both(folder.path(), ended);
         assert_eq!(
             std::fs::read_to_string(outlines.join("VERSION")).unwrap(),
-            "actcheck history 3\n"
+            "actcheck history 4\n"
         );
         let files = std::fs::read_dir(outlines.join("outlines"))
             .unwrap()

@@ -51,7 +51,7 @@ pub fn made(folder: &Path) {
         started: "2026-08-01T12:00:00Z".to_owned(),
         program_version: "0.1.0".to_owned(),
         program_digest: String::new(),
-        physics: None,
+        physics: 0,
     };
     history
         .begin_campaign(&record)
@@ -60,7 +60,7 @@ pub fn made(folder: &Path) {
     for name in ["outlines", "tables"] {
         std::fs::create_dir_all(folder.join(name)).expect("the folder can be written");
     }
-    let version = "actcheck history 3\n";
+    let version = "actcheck history 4\n";
     std::fs::write(folder.join("VERSION"), version).expect("the folder can be written");
 }
 

@@ -75,7 +75,7 @@ def moved_by(action, body):
 
 
 def largest(action, body, extreme):
-    """An extreme of a body during the action: `max_tilt_rad` or `max_displacement_m`; 0 in runs of earlier versions."""
+    """An extreme of a body during the action: `max_tilt_rad` or `max_displacement_m`."""
     return action.extremes.get(body, {}).get(extreme) or 0.0
 
 
@@ -131,9 +131,9 @@ def box_distance(body, point):
 def gripper_distance(action, body):
     """Distance from the point between the fingertips to the surface of a body, and its tolerance.
 
-    Runs of earlier versions have no sizes, and count the distance to the bounding box."""
+    Of a fixed body, the distance to its bounding box counts."""
     body, point = action.after.bodies[body], action.after.gripper
-    if body.size is None:
+    if body.fixed:
         return box_distance(body, point), ROUNDING
     parts = action.run.shapes[body.id]
     exact = all(part.is_exact() for part in parts)
@@ -192,10 +192,10 @@ def harm(action, force_limit, meant, placed=(), since_start=True):
         elif id not in meant and not rolls_on(action, id):
             shares += [left_its_place_by(action, id) / 0.01, 2.0 if knocked_over(action, id) else 0.0]
     shares += [2.0 for id in in_hand(action) if id not in placed and let_go(action, id)]
-    # Fingers of one hand may meet. Runs of earlier versions measured no forces between links.
+    # Fingers of one hand may meet.
     own = [contact for contact in action.self_contacts if not contact["of_hand"]]
     shares += [contact["max_depth_m"] / 0.005 for contact in own]
-    shares += [(contact["max_force_n"] or 0.0) / 5.0 for contact in own]
+    shares += [contact["max_force_n"] / 5.0 for contact in own]
     return shares
 
 
@@ -263,7 +263,7 @@ def surface(action, designator="objectSurface"):
 def from_believed(action, seen):
     """Position and heading of a percept, from the true base when its picture was taken.
 
-    A localisation error is not a perception error. Older runs count the base at the start of the action."""
+    A localisation error is not a perception error. Without a picture, the base at the start of the action counts."""
     base = action.before.base if seen.base is None else seen.base
     believed = action.before.believed if seen.believed is None else seen.believed
     angle = base[2] - believed[2]
@@ -275,9 +275,7 @@ def box_centre(body):
 
 
 def rectangle(body):
-    """Centre, heading, length and width of a body from above. Runs of earlier versions count the bounding box."""
-    if body.size is None:
-        return box_centre(body), 0.0, (body.high - body.low)[:2]
+    """Centre, heading, length and width of a body from above."""
     return box_centre(body), body.pose.yaw(), body.size[:2]
 
 
@@ -299,7 +297,7 @@ def plane_found(action):
 
 def size_error(seen, body):
     """Largest error of the perceived sides of an upright object; the horizontal ones count in either order."""
-    if body.size is None or body.pose.tilt() >= 0.26:
+    if body.pose.tilt() >= 0.26:
         return 0.0
     orders = [seen.size[:2], seen.size[1::-1]]
     return max(min(np.abs(order - body.size[:2]).max() for order in orders), abs(seen.size[2] - body.size[2]))

@@ -49,7 +49,7 @@ class State:
 class Seen:
     """A perceived object or surface, by the robot's estimate of its own pose.
 
-    `base` and `believed` are the true and the estimated base when the picture was taken; None in older runs."""
+    `base` and `believed` are the true and the estimated base when the picture was taken; None without one."""
 
     pose: Pose
     size: np.ndarray

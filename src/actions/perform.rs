@@ -171,7 +171,7 @@ fn perform_one(
         start_secs: contact.start_secs,
         end_secs: contact.end_secs,
         max_force_n: contact.max_force_n,
-        point_m: Some(contact.point_m),
+        point_m: contact.point_m,
     });
     let extremes = record.courses.into_iter().map(|course| Extremes {
         id: course.id,

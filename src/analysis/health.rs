@@ -301,7 +301,7 @@ mod tests {
     #[test]
     fn a_healthy_campaign_has_no_warning() {
         assert_eq!(problems(|_| ()), []);
-        // Histories of older versions have no simulation data.
+        // Runs whose world can't be built have no simulation data.
         assert_eq!(
             problems(|run| (run.deepest_penetration_m, run.energy_gain_j) = (None, None)),
             []

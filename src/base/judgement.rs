@@ -88,13 +88,11 @@ pub struct Judgement {
     ///
     /// `None` if this was not checked: if the property did not pass, or if it states that something
     /// must not happen, which is always the case before an action.
-    #[cfg_attr(feature = "serde", serde(default))]
     pub held_before: Option<bool>,
     /// Whether a passed property would also have passed if the right side of each of its `implies`
     /// were false: no left side held. If so, the pass is no evidence about the right side.
     ///
     /// `None` if the property did not pass or has no such `implies`.
-    #[cfg_attr(feature = "serde", serde(default))]
     pub vacuous: Option<bool>,
 }
 

@@ -60,15 +60,14 @@ pub fn changes(was: &CampaignRecord, is: &CampaignRecord) -> Vec<InputChange> {
         was: Some(was.to_owned()),
         is: Some(is.to_owned()),
     };
-    let [program_was, program_is] = programs(was, is);
     let mut all = vec![
-        single(ChangeKind::Program, "actcheck", &program_was, &program_is),
-        InputChange {
-            kind: ChangeKind::Physics,
-            name: "version".to_owned(),
-            was: was.physics.map(|version| version.to_string()),
-            is: is.physics.map(|version| version.to_string()),
-        },
+        single(ChangeKind::Program, "actcheck", &program(was), &program(is)),
+        single(
+            ChangeKind::Physics,
+            "version",
+            &was.physics.to_string(),
+            &is.physics.to_string(),
+        ),
         single(
             ChangeKind::Config,
             &was.name,
@@ -121,13 +120,9 @@ pub fn other_physics(changes: &[InputChange]) -> Option<String> {
     } else {
         "newer"
     };
-    let version = |version: &Option<String>, word: &str| match version {
-        Some(version) => format!("{word}{version}"),
-        None => "without a version".to_owned(),
-    };
-    let (was, is) = (version(&change.was, "version "), version(&change.is, ""));
+    let (was, is) = (change.was.as_deref()?, change.is.as_deref()?);
     Some(format!(
-        "made by {age} physics ({was}; this program has {is})"
+        "made by {age} physics (version {was}; this program has {is})"
     ))
 }
 
@@ -135,19 +130,15 @@ pub fn other_physics(changes: &[InputChange]) -> Option<String> {
 /// not.
 pub fn made_by_other_physics(record: &CampaignRecord) -> Option<String> {
     let is = CampaignRecord {
-        physics: Some(actcheck_world::PHYSICS_VERSION),
+        physics: actcheck_world::PHYSICS_VERSION,
         ..record.clone()
     };
     other_physics(&changes(record, &is))
 }
 
-/// Version and digest of both programs; only the versions if one of the records has no digest.
-fn programs(was: &CampaignRecord, is: &CampaignRecord) -> [String; 2] {
-    let without = was.program_digest.is_empty() || is.program_digest.is_empty();
-    [was, is].map(|record| match without {
-        true => record.program_version.clone(),
-        false => format!("{} ({})", record.program_version, record.program_digest),
-    })
+/// Version and digest of a program.
+fn program(record: &CampaignRecord) -> String {
+    format!("{} ({})", record.program_version, record.program_digest)
 }
 
 /// One entry for each name on either side.
@@ -198,7 +189,7 @@ mod tests {
             started: String::new(),
             program_version: "0.1.0".to_owned(),
             program_digest: digest.to_owned(),
-            physics: Some(2),
+            physics: 2,
         }
     }
 
@@ -231,24 +222,14 @@ mod tests {
     }
 
     #[test]
-    fn physics_without_a_version_is_older() {
-        let (old, two) = (
-            CampaignRecord {
-                physics: None,
-                ..record("aa")
-            },
-            record("aa"),
-        );
+    fn other_physics_is_older_or_newer() {
+        let two = record("aa");
         let three = CampaignRecord {
-            physics: Some(3),
+            physics: 3,
             ..record("aa")
         };
         assert_eq!(other_physics(&changes(&two, &two)), None);
         let told = |was, is| other_physics(&changes(was, is)).expect("it changed");
-        assert_eq!(
-            told(&old, &two),
-            "made by older physics (without a version; this program has 2)"
-        );
         assert_eq!(
             told(&two, &three),
             "made by older physics (version 2; this program has 3)"
@@ -274,9 +255,5 @@ mod tests {
             (Some("0.1.0 (aa)"), Some("0.1.0 (bb)"))
         );
         assert!(changes(&record("aa"), &record("aa")).is_empty());
-        assert!(
-            changes(&record(""), &record("bb")).is_empty(),
-            "an earlier program wrote no digest"
-        );
     }
 }

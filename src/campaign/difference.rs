@@ -405,7 +405,7 @@ mod tests {
             touches: vec![],
             rests_on: vec!["table_1".into()],
             asleep: true,
-            size_m: None,
+            size_m: [0.1; 3],
             grasp_distance_m: None,
             part: None,
             left_world: false,

@@ -294,7 +294,7 @@ impl Env {
             started,
             program_version: env!("CARGO_PKG_VERSION").to_owned(),
             program_digest: program_digest().to_owned(),
-            physics: Some(world::PHYSICS_VERSION),
+            physics: world::PHYSICS_VERSION,
         }
     }
 

@@ -8,9 +8,8 @@ use crate::{Env, StoredCampaign};
 use actcheck_base::{Diagnostics, Outcome, Source, names};
 use actcheck_config as config;
 use actcheck_config::{CaseText, Launcher, Overrides, WrittenPaths};
-use actcheck_data::{Choice, ChoiceKind, ChoiceName, Choices};
+use actcheck_data::{Choice, ChoiceName};
 use actcheck_history::{CampaignRecord, History, RunDetail};
-use actcheck_scenario as scenario;
 
 /// Name of the folder in which a project keeps its cases.
 const REGRESSIONS: &str = "regressions";
@@ -36,7 +35,7 @@ pub fn export(
     let performed = run.actions.len().min(test.len());
     // Only performed actions are written, so the number of those left out is not needed. Of each
     // placement, only the accepted try is kept.
-    let choices = drop_rejected_tries(&with_candidates(env, index, choices));
+    let choices = drop_rejected_tries(&choices);
     let choices: Vec<Choice> = choices
         .into_iter()
         .filter(|choice| choice.name != ChoiceName::ActionsLeftOut)
@@ -63,27 +62,6 @@ pub fn export(
     }
     case.paths = written.map(|path| seen_from(&folder, &absolute(&home.join(path))));
     config::case_text(&env.campaign, &case)
-}
-
-/// Adds the candidates' names to choices of an old history, which has only their indices: those of
-/// the scene that the choices give now.
-fn with_candidates(env: &Env, index: u64, mut choices: Vec<Choice>) -> Vec<Choice> {
-    let mut again = Choices::recorded(&choices);
-    // If the scene can't be built any more, the choices up to there are enough to name their
-    // candidates.
-    let _ = scenario::draw(&env.space, env.test_of(index), &mut again);
-    for choice in &mut choices {
-        let same = again
-            .made()
-            .iter()
-            .find(|made| made.name == choice.name && made.value == choice.value);
-        if let (ChoiceKind::Index { of }, Some(made)) = (&choice.kind, same)
-            && matches!(&made.kind, ChoiceKind::Candidate { names } if names.len() == *of)
-        {
-            choice.kind = made.kind.clone();
-        }
-    }
-    choices
 }
 
 /// The program that performs actions and its working folder, as a configuration in `folder` names

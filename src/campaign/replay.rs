@@ -11,7 +11,7 @@ use crate::workers::workers;
 use crate::{Env, InputChange, RunContext, TraceDifference, changes};
 use actcheck_actions::Cut;
 use actcheck_base::{Diagnostic, Diagnostics};
-use actcheck_data::{ActionEnd, Choice, ChoiceKind, Choices, Trace};
+use actcheck_data::{ActionEnd, Choice, Choices, Trace};
 use actcheck_history::{CampaignRecord, History, RunDetail};
 
 /// Maximum number of choices named in a message.
@@ -260,17 +260,8 @@ fn misfit(was: &Choice, is: &Choice) -> Option<MisfitKind> {
             was: was.value,
             is: is.value,
         }),
-        _ if is_same_kind(&was.kind, &is.kind) => None,
+        _ if was.kind == is.kind => None,
         _ => Some(MisfitKind::OtherKind),
-    }
-}
-
-/// Whether two kinds have the same values. Old histories have the number of candidates, without
-/// their names.
-fn is_same_kind(was: &ChoiceKind, is: &ChoiceKind) -> bool {
-    match (was, is) {
-        (ChoiceKind::Index { of }, ChoiceKind::Candidate { names }) => names.len() == *of,
-        _ => was == is,
     }
 }
 
@@ -341,7 +332,7 @@ fn outcome_changes(was: &RunDetail, is: &FinishedRun) -> Vec<OutcomeChange> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use actcheck_data::ChoiceName;
+    use actcheck_data::{ChoiceKind, ChoiceName};
 
     fn real(name: &str, high: f64, value: f64) -> Choice {
         Choice {
@@ -406,16 +397,6 @@ mod tests {
         assert_eq!(
             gone.as_deref(),
             Some("`surface.name` was `a`, which it can't be now, is `b`")
-        );
-        let old = |of| Choice {
-            kind: ChoiceKind::Index { of },
-            ..candidate(&[], 0.0)
-        };
-        assert_eq!(misfit_text(old(1), candidate(&["a"], 0.0)), None);
-        let grown = misfit_text(old(1), candidate(&["b", "a"], 0.0));
-        assert_eq!(
-            grown.as_deref(),
-            Some("`surface.name` has another kind or range now")
         );
     }
 }

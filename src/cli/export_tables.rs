@@ -91,14 +91,4 @@ fn print_dataset(dataset: &Dataset) {
             dataset.withheld
         ));
     }
-    if dataset.without_course > 0 {
-        let note = Diagnostic::warning(
-            "X054",
-            format!(
-                "{} of {runs} runs have no robot motion: an earlier version stored them",
-                dataset.without_course
-            ),
-        );
-        output::print_diagnostics(&note.help("run the campaign again to record it").into());
-    }
 }

@@ -66,8 +66,8 @@ pub enum ProofFormat {
     Dot,
 }
 
-/// Parses a duration such as `90s`, `10m` or `1h30m` into seconds. A plain number, which earlier
-/// versions required, is a number of seconds.
+/// Parses a duration such as `90s`, `10m` or `1h30m` into seconds. A plain number is a
+/// number of seconds.
 ///
 /// # Errors
 /// A message if the text is neither, or not above zero.

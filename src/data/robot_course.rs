@@ -14,20 +14,17 @@ pub struct RobotCourse {
     pub self_contacts: Vec<SelfCollision>,
     /// Objects that both fingers touched at the same time, in scene order.
     pub held: Vec<HeldCourse>,
-    /// Objects that the robot came near, in scene order. Empty in traces of earlier versions.
-    #[serde(skip)]
+    /// Objects that the robot came near, in scene order.
     pub clearances: Vec<Clearance>,
     /// Its measurements and commands. Stored with the bodies' tracks, which not every reader needs.
     #[serde(skip)]
     pub motion: Motion,
     /// Quantities of all bodies at the control rate, for rules about time. Stored with the bodies'
-    /// tracks. Empty in traces of earlier versions.
+    /// tracks.
     #[serde(skip)]
     pub samples: Samples,
-    /// When objects were held and when they moved, by [`Samples::intervals`]. `None` in traces of
-    /// earlier versions.
-    #[serde(skip)]
-    pub intervals: Option<Vec<Interval>>,
+    /// When objects were held and when they moved, by [`Samples::intervals`].
+    pub intervals: Vec<Interval>,
 }
 
 /// Extremes of one joint. Units: metres or radians, by kind.
@@ -53,11 +50,10 @@ pub struct SelfCollision {
     /// Time of its first detection since the action began. Unit: seconds.
     pub start_secs: f64,
     /// Largest penetration depth, of solid material only: hulls that fill the hollows of a mesh do
-    /// not count. In traces of earlier versions, they do. Unit: metres.
+    /// not count. Unit: metres.
     pub max_depth_m: f64,
-    /// How hard they pressed each other. `None` in traces of earlier versions.
-    #[serde(skip)]
-    pub press: Option<SelfPress>,
+    /// How hard they pressed each other.
+    pub press: SelfPress,
 }
 
 /// The force between two links.

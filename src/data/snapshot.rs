@@ -49,21 +49,15 @@ pub struct BodyState {
     pub rests_on: Vec<String>,
     /// Whether physics has put it to sleep.
     pub asleep: bool,
-    /// Dimensions along its own axes, in its scaled size. Unit: metres. `None` in traces of earlier
-    /// versions.
-    #[serde(skip)]
-    pub size_m: Option<[f64; 3]>,
+    /// Dimensions along its own axes, in its scaled size. Unit: metres.
+    pub size_m: [f64; 3],
     /// Distance from the grasp point to the surface of its shapes; negative inside. Unit: metres.
-    /// `None` for static bodies and in traces of earlier versions.
-    #[serde(skip)]
+    /// `None` for static bodies.
     pub grasp_distance_m: Option<f64>,
     /// If it is a part that a joint moves: the id of the whole, and the joint's position in metres
-    /// or radians. `None` in traces read from a history.
-    #[serde(skip)]
+    /// or radians.
     pub part: Option<(String, f64)>,
-    /// Whether the robot flung, pushed or dropped it out of the world, where it stays. False in
-    /// traces of earlier versions.
-    #[serde(skip)]
+    /// Whether the robot flung, pushed or dropped it out of the world, where it stays.
     pub left_world: bool,
 }
 
@@ -84,11 +78,9 @@ pub struct RobotState {
     pub left_touches: Vec<String>,
     /// Ids of objects that the right finger touches, sorted.
     pub right_touches: Vec<String>,
-    /// Poses of all links. Empty in traces of earlier versions.
-    #[serde(skip)]
+    /// Poses of all links.
     pub links: Vec<LinkState>,
     /// Its suction cup; `None` if its gripper has fingers.
-    #[serde(skip)]
     pub cup: Option<CupState>,
 }
 

@@ -23,9 +23,9 @@ pub struct Trace {
     pub hash: String,
     /// The names of places in the world.
     pub map: SceneMap,
-    /// Shapes of objects and links, for pictures. Empty in traces of earlier versions.
+    /// Shapes of objects and links, for pictures.
     pub forms: Vec<Form>,
-    /// The robot's course during each performed action. Empty in traces of earlier versions.
+    /// The robot's course during each performed action.
     pub robot_courses: Vec<RobotCourse>,
 }
 
@@ -136,10 +136,8 @@ pub struct ContactEpisode {
     pub end_secs: f64,
     /// Largest normal force. Unit: newtons.
     pub max_force_n: f64,
-    /// Position of the contact at its largest force. Unit: metres. Frame: world. `None` in traces
-    /// of earlier versions.
-    #[serde(skip)]
-    pub point_m: Option<[f64; 3]>,
+    /// Position of the contact at its largest force. Unit: metres. Frame: world.
+    pub point_m: [f64; 3],
 }
 
 /// The moment at which the robot took a picture or perceived an object.
@@ -164,8 +162,8 @@ pub struct Percept {
     pub pose: Pose,
     /// Perceived dimensions. Unit: metres.
     pub size_m: [f64; 3],
-    /// The moment of perception. `None` in traces of earlier versions.
-    #[serde(skip)]
+    /// The moment of perception. `None` if a program reported it without a picture of the
+    /// simulated camera.
     pub look: Option<Look>,
 }
 
@@ -176,8 +174,7 @@ pub struct Perceived {
     pub plane: Option<PerceivedPlane>,
     /// The objects perceived on it, in no particular order.
     pub things: Vec<PerceivedThing>,
-    /// The moment of the last picture. `None` in traces of earlier versions.
-    #[serde(skip)]
+    /// The moment of the last picture. `None` if the simulated camera did not take any.
     pub look: Option<Look>,
 }
 

@@ -42,10 +42,10 @@ pub(super) fn of_action(trace: &Trace, step: usize) -> Option<Course> {
     }
     for body in &trace.snapshots.get(step)?.bodies {
         let form = trace.forms.iter().find(|form| form.name == body.id);
-        // Without its shape, as in traces of earlier versions, a body is a box.
+        // A body without a form is a box of its size.
         let solids = match form {
             Some(form) => form.parts.iter().map(solid_of).collect(),
-            None => body.size_m.map(boxed).into_iter().collect(),
+            None => vec![boxed(body.size_m)],
         };
         course.set_solids(thing_iri(&body.id), solids);
     }

@@ -90,9 +90,7 @@ fn write_contact(number: usize, contact: &ContactEpisode, writer: &mut Writer) {
         ["start", "end", "maxForce"],
         [contact.start_secs, contact.end_secs, contact.max_force_n],
     );
-    if let Some(point) = contact.point_m {
-        writer.numbers(subject, ["x", "y", "z"], point);
-    }
+    writer.numbers(subject, ["x", "y", "z"], contact.point_m);
 }
 
 fn write_extremes(extremes: &Extremes, writer: &mut Writer) {

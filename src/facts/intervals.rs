@@ -3,21 +3,17 @@
 use crate::writer::Writer;
 use actcheck_data::{ActionTrace, IntervalKind, RobotCourse};
 
-/// Writes when objects were held and when they moved. Marks the intervals as recorded, so that
-/// rules don't take missing ones for a pass.
+/// Writes when objects were held and when they moved.
 pub(super) fn write(course: &RobotCourse, writer: &mut Writer) {
-    let Some(intervals) = &course.intervals else {
-        return;
-    };
-    let action = writer.w("action");
-    writer.boolean(action, "intervalsRecorded", true);
     for (kind, heading, class, property) in [
         (IntervalKind::Hold, "hold", "Hold", "heldObject"),
         (IntervalKind::Motion, "motion", "Motion", "movedObject"),
     ] {
-        for (number, interval) in
-            (1..).zip(intervals.iter().filter(|interval| interval.kind == kind))
-        {
+        let of_kind = course
+            .intervals
+            .iter()
+            .filter(|interval| interval.kind == kind);
+        for (number, interval) in (1..).zip(of_kind) {
             let subject = writer.named(heading, &number.to_string());
             writer.world_class(subject, class);
             let thing = writer.thing(&interval.thing);

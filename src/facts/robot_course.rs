@@ -7,11 +7,8 @@ use actcheck_data::RobotCourse;
 /// written.
 const MIN_SPEED_SHARE: f64 = 0.01;
 
-/// Writes how close joints came to their limits, self-contacts, clearances and held objects. Marks
-/// the robot as measured, so that rules don't take missing facts for a pass.
+/// Writes how close joints came to their limits, self-contacts, clearances and held objects.
 pub(super) fn write(course: &RobotCourse, writer: &mut Writer) {
-    let action = writer.w("action");
-    writer.boolean(action, "robotMeasured", true);
     for joint in &course.joints {
         let subject = writer.named("joint", &joint.name);
         // A continuous joint is infinitely far from its limits.
@@ -37,10 +34,8 @@ pub(super) fn write(course: &RobotCourse, writer: &mut Writer) {
             ["seenAt", "maxDepth"],
             [contact.start_secs, contact.max_depth_m],
         );
-        if let Some(press) = contact.press {
-            writer.number(subject, "maxForce", press.max_force_n);
-            writer.boolean(subject, "fingersMeet", press.of_hand);
-        }
+        writer.number(subject, "maxForce", contact.press.max_force_n);
+        writer.boolean(subject, "fingersMeet", contact.press.of_hand);
     }
     for near in &course.clearances {
         let subject = writer.thing(&near.id);

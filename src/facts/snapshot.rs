@@ -33,9 +33,7 @@ fn write_body(body: &BodyState, writer: &mut Writer) {
         ["mass", "friction", "restitution"],
         [body.mass_kg, body.friction, body.restitution],
     );
-    if let Some(size_m) = body.size_m {
-        writer.numbers(subject, ["sizeX", "sizeY", "sizeZ"], size_m);
-    }
+    writer.numbers(subject, ["sizeX", "sizeY", "sizeZ"], body.size_m);
     if let Some(distance) = body.grasp_distance_m {
         writer.number(subject, "gripperDistance", distance);
     }

@@ -90,15 +90,18 @@ pub(super) fn foreign(dir: &Path) -> Diagnostics {
         .into()
 }
 
-/// H004: a newer program wrote the history.
-pub(super) fn newer(dir: &Path, theirs: u64, ours: u64) -> Diagnostics {
+/// H004: the history has another format.
+pub(super) fn other_format(dir: &Path, theirs: u64, ours: u64) -> Diagnostics {
     let message = format!(
-        "the history `{}` was written by a newer actcheck: its format is {theirs}, this program supports {ours}",
+        "the history `{}` has format {theirs}; this version of actcheck reads format {ours}",
         dir.display()
     );
-    Diagnostic::error("H004", message)
-        .help("update actcheck, or name another folder with `--history DIR`; nothing was changed")
-        .into()
+    let help = if theirs > ours {
+        "update actcheck, or name another folder with `--history DIR`; nothing was changed"
+    } else {
+        "no release wrote this format: name another folder with `--history DIR`; nothing was changed"
+    };
+    Diagnostic::error("H004", message).help(help).into()
 }
 
 /// Reading or writing a file failed.

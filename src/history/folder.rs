@@ -15,14 +15,12 @@ use crate::snapshot::LONGEST_COPIED;
 use crate::{fault, journal};
 use actcheck_base::{Below, Diagnostics, FileKind};
 
-/// Format of a folder without a journal.
-const FORMAT: u64 = 1;
-/// Format of a folder with a journal, which earlier versions do not read: they would miss its runs.
-const FORMAT_WITH_JOURNAL: u64 = 2;
-/// Format of a folder with outlines, which earlier versions do not read either. The newest that
-/// this program reads.
-const FORMAT_WITH_OUTLINES: u64 = 3;
+/// Format of the folder. It changes whenever a file of it does.
+const FORMAT: u64 = 4;
 const TITLE: &str = "actcheck history";
+/// The mark of a folder with a journal, which follows the format: without it, a lost journal would
+/// not be noticed.
+const WITH_JOURNAL: &str = "journal";
 /// Longest version file. Unit: bytes.
 const LONGEST_VERSION: u64 = 1_000;
 /// Longest file of a history that is read as a whole: those of this program have some megabytes.
@@ -85,7 +83,7 @@ impl Folder {
             lock: Some(lock(dir)?),
         };
         if !known {
-            folder.write_version(FORMAT)?;
+            folder.write_version(false)?;
         }
         let traces = folder.below().create_folder(&folder.traces());
         traces.map_err(|error| fault::io(dir, "creating the folder of traces", &error))?;
@@ -116,18 +114,13 @@ impl Folder {
         lock.is_ok_and(|lock| matches!(lock.try_lock_shared(), Err(TryLockError::WouldBlock)))
     }
 
-    /// Marks the folder before its journal is created, or after it was removed, so that programs
-    /// which know no journals read only complete histories.
+    /// Marks the folder before its journal is created, or after it was removed, so that a lost
+    /// journal is noticed.
     pub(super) fn mark_journal(&self, exists: bool) -> Result<(), Diagnostics> {
-        let format = match exists {
-            _ if self.outlines().exists() => FORMAT_WITH_OUTLINES,
-            true => FORMAT_WITH_JOURNAL,
-            false => FORMAT,
-        };
-        if version(&self.dir)? == Some(format) {
+        if version(&self.dir)?.is_some_and(|version| version.has_journal == exists) {
             Ok(())
         } else {
-            self.write_version(format)
+            self.write_version(exists)
         }
     }
 
@@ -140,26 +133,26 @@ impl Folder {
         let exists = self.below().kind(&self.dir.join(journal::NAME)).is_some();
         (
             exists,
-            version(&self.dir).is_ok_and(|version| version == Some(FORMAT_WITH_JOURNAL)),
+            version(&self.dir)
+                .is_ok_and(|version| version.is_some_and(|version| version.has_journal)),
         )
     }
 
-    /// Creates the folder of outlines, and marks the history before.
+    /// Creates the folder of outlines.
     pub(super) fn begin_outlines(&self) -> Result<(), Diagnostics> {
         if self.outlines().exists() {
             return Ok(());
         }
-        self.write_version(FORMAT_WITH_OUTLINES)?;
         let created = self.below().create_folder(&self.outlines());
         created.map_err(|error| fault::io(&self.dir, "creating its outlines", &error))
     }
 
-    fn write_version(&self, format: u64) -> Result<(), Diagnostics> {
+    fn write_version(&self, has_journal: bool) -> Result<(), Diagnostics> {
+        let mark = if has_journal { WITH_JOURNAL } else { "" };
+        let text = format!("{TITLE} {FORMAT} {mark}");
+        let line = format!("{}\n", text.trim_end());
         self.below()
-            .write_atomic(
-                &self.dir.join("VERSION"),
-                format!("{TITLE} {format}\n").as_bytes(),
-            )
+            .write_atomic(&self.dir.join("VERSION"), line.as_bytes())
             .map_err(|error| fault::io(&self.dir, "writing its version", &error))
     }
 
@@ -297,15 +290,22 @@ pub(super) fn read(path: &Path) -> io::Result<Vec<u8>> {
 /// Whether the folder has a history that this program can read.
 fn has_version(dir: &Path) -> Result<bool, Diagnostics> {
     match version(dir)? {
-        Some(version) if version > FORMAT_WITH_OUTLINES => {
-            Err(fault::newer(dir, version, FORMAT_WITH_OUTLINES))
+        Some(version) if version.format != FORMAT => {
+            Err(fault::other_format(dir, version.format, FORMAT))
         }
         version => Ok(version.is_some()),
     }
 }
 
-/// The format of the history in a folder. Returns `None` if it has none.
-fn version(dir: &Path) -> Result<Option<u64>, Diagnostics> {
+/// The content of the version file.
+struct Version {
+    format: u64,
+    /// Whether the folder has a journal, unless it was lost.
+    has_journal: bool,
+}
+
+/// The version of the history in a folder. Returns `None` if it has none.
+fn version(dir: &Path) -> Result<Option<Version>, Diagnostics> {
     let text = match Below::new(dir).read_text(&dir.join("VERSION"), LONGEST_VERSION) {
         Ok(text) => text,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
@@ -315,12 +315,15 @@ fn version(dir: &Path) -> Result<Option<u64>, Diagnostics> {
         }
         Err(error) => return Err(fault::io(dir, "reading its version", &error)),
     };
-    match text
-        .trim()
+    let mut words = text
         .strip_prefix(TITLE)
-        .and_then(|number| number.trim().parse::<u64>().ok())
-    {
-        Some(version) => Ok(Some(version)),
+        .unwrap_or_default()
+        .split_whitespace();
+    match words.next().and_then(|number| number.parse().ok()) {
+        Some(format) => Ok(Some(Version {
+            format,
+            has_journal: words.next() == Some(WITH_JOURNAL),
+        })),
         None => Err(fault::foreign(dir)),
     }
 }

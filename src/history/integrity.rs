@@ -120,11 +120,8 @@ impl History {
         runs.retain(|run| !outlines.contains(&run.run));
         found.runs = runs.len();
         let store = self.store()?;
-        // The fault of the copy of a run's outcomes in its trace file. (Files of earlier versions
-        // have none.)
+        // The fault of the copy of a run's outcomes in its trace file.
         let fault_of_copy = |id: &str, bytes: &[u8]| match trace_file::after_trace(bytes) {
-            Ok([]) => None,
-            Ok(after) if trace_parts::is_older(after) => None,
             Ok(after) => match (
                 trace_parts::of_bytes(after),
                 detail::parts(&*store, &run_node(id)),

@@ -53,7 +53,6 @@ mod syntax_fault;
 mod tail;
 mod terms;
 mod threads;
-mod trace_details;
 mod trace_file;
 mod trace_parts;
 mod vertical;

@@ -109,7 +109,7 @@ impl History {
     ///
     /// # Errors
     /// `H001` the folder can't be used, `H002` another process has it open, `H003` it holds other
-    /// files, `H004` a newer program wrote it, `H005` the disk is full, `H006`, `H007` it is
+    /// files, `H004` it has another format, `H005` the disk is full, `H006`, `H007` it is
     /// damaged.
     pub fn open(dir: &Path) -> Result<Self, Diagnostics> {
         Self::open_folder(Folder::lock_exclusive(dir, true)?, cores())
@@ -345,7 +345,7 @@ impl Drop for History {
             // Without a new seal, the earlier one still covers its files.
             let _ = Seal::write(&self.folder);
             if !self.dir().join(journal::NAME).exists() {
-                // If it remains marked, only earlier versions refuse it.
+                // If it remains marked, no file of a run lacks its statements.
                 let _ = self.folder.mark_journal(false);
             }
         }

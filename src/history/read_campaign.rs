@@ -57,7 +57,6 @@ pub(super) fn beginning(store: &Store, id: &str) -> Result<Option<CampaignRecord
         skill: skill(&node),
         seed: node.count("act:seed").unwrap_or_default(),
         planned_runs: node.count("act:plannedRuns").unwrap_or_default(),
-        // Histories from before repetitions were introduced lack it.
         repeat: node
             .count("act:repeat")
             .and_then(|repeat| u32::try_from(repeat).ok())
@@ -75,7 +74,8 @@ pub(super) fn beginning(store: &Store, id: &str) -> Result<Option<CampaignRecord
         program_digest: text(&node, "act:programDigest"),
         physics: node
             .count("act:physics")
-            .and_then(|version| u32::try_from(version).ok()),
+            .and_then(|version| u32::try_from(version).ok())
+            .unwrap_or_default(),
     }))
 }
 

@@ -25,8 +25,7 @@ pub struct CampaignRecord {
     pub ontology_digest: String,
     /// Property IRI, rule path and digest of the rule file (with its libraries), sorted.
     pub rules: Vec<(String, String, String)>,
-    /// Warnings about the ontology and the rules, sorted; empty if an earlier version wrote the
-    /// campaign.
+    /// Warnings about the ontology and the rules, sorted.
     pub findings: Vec<FindingRecord>,
     /// Digests of robot and models by name, sorted.
     pub models: Vec<(String, String)>,
@@ -52,10 +51,10 @@ pub struct CampaignRecord {
     pub started: String,
     /// Version of this program.
     pub program_version: String,
-    /// Digest of the program's sources; empty if an earlier version wrote the campaign.
+    /// Digest of the program's sources.
     pub program_digest: String,
-    /// Version of the program's physics; `None` if an earlier version wrote the campaign.
-    pub physics: Option<u32>,
+    /// Version of the program's physics.
+    pub physics: u32,
 }
 
 /// A warning about the ontology or the rules of a campaign.

@@ -38,7 +38,7 @@ pub(super) struct Seal {
 pub(super) enum Found {
     /// It is complete.
     Whole(Seal),
-    /// There is none: an earlier version wrote the history, or its first process was killed.
+    /// There is none: the history's first process was killed, or the file is lost.
     Missing,
     /// The list itself is damaged.
     Damaged,

@@ -21,7 +21,7 @@ pub(super) enum Tail {
     Whole,
     /// It ended within a record.
     Cut,
-    /// The version of the folder says that there is one, but there was none.
+    /// The folder is marked to have one, but there was none.
     Missing,
 }
 

@@ -12,27 +12,22 @@ use flate2::write::GzEncoder;
 
 use crate::frames;
 use crate::inflate::{expanded, most_expanded};
-use crate::trace_details::{Cups, Details, Intervals, Marks};
 use actcheck_base::Steps;
 use actcheck_data::{
     ActionTrace, Choice, Form, Frames, RobotCourse, Samples, SceneMap, Series, Snapshot, Trace,
 };
 
-/// Magic bytes at the start of each file. The last one is the format version; it increases whenever
-/// a type of the trace changes.
-const MAGIC: &[u8; 8] = b"actrace4";
-/// Magic bytes of files whose choices have the indices of candidates, without their names. All else
-/// is the same.
-const WITHOUT_CANDIDATES: &[u8; 8] = b"actrace3";
+/// First bytes of each file of any format.
+const TITLE: &[u8] = b"actrace";
+/// Format of the file, which follows the title. It changes whenever a type of the trace changes.
+const FORMAT: u8 = b'5';
 
 /// Maximum number of samples of an action: limits the memory that a corrupt file can request, whose
 /// constant series take a byte. A long action has some million.
 const MOST_SAMPLES: usize = 1 << 26;
 
-/// First part: choices, states, actions, time between frames, names of tracks, hash. The map, the
-/// forms of bodies, the courses of the robot, [`Details`] and [`Intervals`] follow it, then, of a
-/// robot with a suction cup, [`Cups`], and [`Marks`] if there are any. (Traces of earlier versions
-/// end before any of these.)
+/// First part: choices, states, actions, time between frames, names of tracks, hash, map, forms of
+/// bodies, and the courses of the robot.
 type Head = (
     Vec<Choice>,
     Vec<Snapshot>,
@@ -40,6 +35,9 @@ type Head = (
     f64,
     Vec<String>,
     String,
+    SceneMap,
+    Vec<Form>,
+    Vec<RobotCourse>,
 );
 
 /// Encodes a run's file.
@@ -52,7 +50,7 @@ pub(super) fn encode(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, Strin
         compressed(&[frames::encode(&trace.frames.rows), encode_motions(trace)?].concat())?;
     let length =
         u32::try_from(head.len()).map_err(|_| "its trace is larger than 4 GB".to_owned())?;
-    Ok([MAGIC.as_slice(), &length.to_le_bytes(), &head, &course].concat())
+    Ok([TITLE, &[FORMAT], &length.to_le_bytes(), &head, &course].concat())
 }
 
 /// Encodes the choices and the data from which facts are extracted.
@@ -68,26 +66,11 @@ pub(super) fn encode_head(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, 
         frames.period_secs,
         &frames.names,
         &trace.hash,
-    );
-    let mut head = postcard::to_stdvec(&head).map_err(|error| error.to_string())?;
-    let later = (
         &trace.map,
         &trace.forms,
         &trace.robot_courses,
-        Details::of(trace),
-        Intervals::of(trace),
     );
-    head.extend(postcard::to_stdvec(&later).map_err(|error| error.to_string())?);
-    let (cups, marks) = (Cups::of(trace), Marks::of(trace));
-    if cups.is_some() || marks.is_some() {
-        head.extend(
-            postcard::to_stdvec(&cups.unwrap_or_default()).map_err(|error| error.to_string())?,
-        );
-    }
-    if let Some(marks) = marks {
-        head.extend(postcard::to_stdvec(&marks).map_err(|error| error.to_string())?);
-    }
-    Ok(head)
+    postcard::to_stdvec(&head).map_err(|error| error.to_string())
 }
 
 /// Decodes the choices and the whole trace.
@@ -198,8 +181,7 @@ fn skip_motion<'b>(_: &mut RobotCourse, bytes: &'b [u8]) -> Option<&'b [u8]> {
 }
 
 /// Reads the robot's motion at a position of the expanded bytes by `motion`, which returns the
-/// remaining bytes, and decodes the samples. Traces of earlier versions end before either and have
-/// none.
+/// remaining bytes, and decodes the samples.
 fn read_motions(
     bytes: &Arc<Vec<u8>>,
     at: usize,
@@ -207,14 +189,8 @@ fn read_motions(
     motion: impl for<'b> Fn(&mut RobotCourse, &'b [u8]) -> Option<&'b [u8]>,
 ) -> Option<()> {
     let mut rest = bytes.get(at..)?;
-    if rest.is_empty() {
-        return Some(());
-    }
     for course in &mut trace.robot_courses {
         rest = motion(course, rest)?;
-    }
-    if rest.is_empty() {
-        return Some(());
     }
     let mut at = bytes.len() - rest.len();
     for course in &mut trace.robot_courses {
@@ -270,22 +246,15 @@ pub(super) fn head_choices(head: &[u8]) -> Result<Vec<Choice>, String> {
 /// # Errors
 /// A message that names the damaged part.
 pub(super) fn decode_head(head: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
-    let read = |error: postcard::Error| error.to_string().to_lowercase();
-    let (head, rest): (Head, &[u8]) = postcard::take_from_bytes(head).map_err(read)?;
-    let (map, rest): (SceneMap, &[u8]) = part_of(rest).map_err(read)?;
-    let (forms, rest): (Vec<Form>, &[u8]) = part_of(rest).map_err(read)?;
-    let (robot_courses, rest): (Vec<RobotCourse>, &[u8]) = part_of(rest).map_err(read)?;
-    let (details, rest): (Details, &[u8]) = part_of(rest).map_err(read)?;
-    let (intervals, rest): (Intervals, &[u8]) = part_of(rest).map_err(read)?;
-    let (cups, rest): (Cups, &[u8]) = part_of(rest).map_err(read)?;
-    let (marks, _): (Marks, &[u8]) = part_of(rest).map_err(read)?;
-    let (choices, snapshots, actions, period_secs, names, hash) = head;
+    let head: Head =
+        postcard::from_bytes(head).map_err(|error| error.to_string().to_lowercase())?;
+    let (choices, snapshots, actions, period_secs, names, hash, map, forms, robot_courses) = head;
     let frames = Frames {
         period_secs,
         names,
         rows: Vec::new(),
     };
-    let mut trace = Trace {
+    let trace = Trace {
         snapshots,
         actions,
         frames,
@@ -294,35 +263,25 @@ pub(super) fn decode_head(head: &[u8]) -> Result<(Vec<Choice>, Trace), String> {
         forms,
         robot_courses,
     };
-    details.fill(&mut trace);
-    intervals.fill(&mut trace);
-    cups.fill(&mut trace);
-    marks.fill(&mut trace);
     Ok((choices, trace))
 }
 
-/// The next part, or an empty one if the file ends before it.
-fn part_of<'a, T: Default + serde::Deserialize<'a>>(
-    rest: &'a [u8],
-) -> Result<(T, &'a [u8]), postcard::Error> {
-    if rest.is_empty() {
-        Ok((T::default(), rest))
-    } else {
-        postcard::take_from_bytes(rest)
-    }
-}
-
 fn parts(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
-    let rest = [MAGIC, WITHOUT_CANDIDATES]
-        .into_iter()
-        .find_map(|magic| bytes.strip_prefix(magic.as_slice()));
-    let rest = rest.ok_or("it is not a trace of this format")?;
+    let rest = bytes.strip_prefix(TITLE).ok_or("it is not a trace")?;
+    let (format, rest) = rest.split_first().ok_or("it ends too early")?;
+    if *format != FORMAT {
+        return Err(format!(
+            "its format is {}, this program reads format {}",
+            char::from(*format).escape_default(),
+            char::from(FORMAT)
+        ));
+    }
     let (length, rest) = rest.split_first_chunk::<4>().ok_or("it ends too early")?;
     rest.split_at_checked(u32::from_le_bytes(*length) as usize)
         .ok_or_else(|| "it ends too early".to_owned())
 }
 
-/// The bytes after the trace: the copy of its outcomes, or nothing.
+/// The bytes after the trace: the copy of its outcomes.
 ///
 /// # Errors
 /// A message that names the damaged part.

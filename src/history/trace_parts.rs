@@ -1,8 +1,7 @@
 //! A copy of a run's objects, actions and outcomes at the end of its trace file.
 //!
-//! They are read in a tenth of the time that the store takes, where each is many statements.
-//! Programs that know nothing of the copy do not read it; files without it, and damaged ones, are
-//! read from the store.
+//! They are read in a tenth of the time that the store takes, where each is many statements. If
+//! the copy is missing or damaged, they are read from the store.
 
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::Path;
@@ -15,8 +14,6 @@ use crate::trace_file::compressed;
 /// Last bytes of a file that has a copy. The last one is its version; it increases whenever a type
 /// of [`Parts`] changes.
 const MAGIC: &[u8; 8] = b"actpart2";
-/// Those of earlier versions, whose copies are not read.
-const OLDER: [&[u8; 8]; 1] = [b"actpart1"];
 /// Size of the length and the magic bytes after the copy. Unit: bytes.
 const TRAILER: u64 = 12;
 
@@ -49,11 +46,6 @@ pub(super) fn read(file: &Path) -> Option<(String, Parts)> {
     let mut after = Vec::new();
     file.read_to_end(&mut after).ok()?;
     of_bytes(&after).ok()
-}
-
-/// Returns whether the bytes after a trace are the copy of an earlier version, which is not read.
-pub(super) fn is_older(after: &[u8]) -> bool {
-    OLDER.iter().any(|magic| after.ends_with(*magic))
 }
 
 /// Reads the copy in the bytes after a trace, and the hash of its trace.

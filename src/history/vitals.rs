@@ -29,11 +29,10 @@ pub struct RunVitals {
     pub repetition: u64,
     /// Unit: seconds.
     pub wall_secs: f64,
-    /// Deepest penetration of two bodies. Unit: metres. `None` in runs of earlier versions, which
-    /// did not measure it.
+    /// Deepest penetration of two bodies. Unit: metres. `None` if the run was not simulated.
     pub deepest_penetration_m: Option<f64>,
-    /// Energy that the simulation created by error. Unit: joules. `None` in runs of earlier
-    /// versions, which did not measure it.
+    /// Energy that the simulation created by error. Unit: joules. `None` if the run was not
+    /// simulated.
     pub energy_gain_j: Option<f64>,
 }
 

@@ -39,10 +39,7 @@ pub(super) fn beginning(record: &CampaignRecord, number: u64) -> Vec<Quad> {
         .has("prov:startedAtTime", time(&record.started))
         .text("act:program", &program(&record.program_version))
         .text("act:programDigest", &record.program_digest)
-        .optional(
-            "act:physics",
-            record.physics.map(|version| count(u64::from(version))),
-        );
+        .has("act:physics", count(u64::from(record.physics)));
     if let Some(skill) = &record.skill {
         statements
             .about(campaign.clone())

@@ -27,7 +27,7 @@ mod tests {
             start_secs: f64::from(100 - idx),
             end_secs: 200.0,
             max_force_n: f64::from(idx % 50),
-            point_m: None,
+            point_m: [0.0; 3],
         };
         let all: Vec<ContactEpisode> = (0..100).map(contact).collect();
         let shown = strongest(&all);

@@ -296,7 +296,7 @@ mod tests {
             touches: Vec::new(),
             rests_on: vec![rests_on.to_owned()],
             asleep: false,
-            size_m: None,
+            size_m: [0.1; 3],
             grasp_distance_m: None,
             part: None,
             left_world: false,
@@ -334,7 +334,7 @@ mod tests {
             start_secs: *start,
             end_secs: start + 1.0,
             max_force_n: 5.0,
-            point_m: None,
+            point_m: [0.0; 3],
         });
         let action = ActionTrace {
             contacts: contacts.collect(),

@@ -22,9 +22,8 @@ pub(super) struct Pressed {
     pub force_n: f64,
     /// Start and end, since the run began. Unit: seconds.
     pub secs: [f64; 2],
-    /// Position at the largest force. Unit: metres. Frame: world. `None` in runs of earlier
-    /// versions.
-    pub point_m: Option<[f64; 3]>,
+    /// Position at the largest force. Unit: metres. Frame: world.
+    pub point_m: [f64; 3],
 }
 
 impl Pressed {
@@ -45,11 +44,11 @@ impl Pressed {
 
     /// The contact with its time and its position.
     pub(super) fn sentence(&self) -> String {
-        let [start, end] = self.secs;
-        let place = self.point_m.map_or_else(String::new, |[x, y, z]| {
-            format!(", at x = {x:.2}, y = {y:.2}, z = {z:.2} m")
-        });
-        format!("{}, from {start:.1} s to {end:.1} s{place}", self.label())
+        let ([start, end], [x, y, z]) = (self.secs, self.point_m);
+        format!(
+            "{}, from {start:.1} s to {end:.1} s, at x = {x:.2}, y = {y:.2}, z = {z:.2} m",
+            self.label()
+        )
     }
 }
 
@@ -120,7 +119,7 @@ fn fingers_meet(trace: &Trace, idx: usize, contact: &ContactEpisode) -> bool {
         .map(|course| course.self_contacts.as_slice())
         .unwrap_or_default();
     own.iter()
-        .any(|own| own.pair == contact.pair && own.press.is_some_and(|press| press.of_hand))
+        .any(|own| own.pair == contact.pair && own.press.of_hand)
 }
 
 fn is_target(action: &ActionTrace, thing: &str) -> bool {
@@ -149,7 +148,7 @@ mod tests {
     use actcheck_data::{RobotCourse, SelfCollision, SelfPress};
 
     fn contact(pair: [&str; 2], start_secs: f64, max_force_n: f64) -> ContactEpisode {
-        let point_m = Some([1.0, 0.25, 0.5]);
+        let point_m = [1.0, 0.25, 0.5];
         ContactEpisode {
             pair: pair.map(str::to_owned),
             start_secs,
@@ -220,10 +219,10 @@ mod tests {
         let pair = ["robot/left", "robot/right"];
         let mut trace = trace(vec![contact(pair, 1.0, 80.0)]);
         for (of_hand, expected) in [(true, None), (false, Some("left presses right: 80 N"))] {
-            let press = Some(SelfPress {
+            let press = SelfPress {
                 max_force_n: 80.0,
                 of_hand,
-            });
+            };
             let met = SelfCollision {
                 pair: pair.map(str::to_owned),
                 start_secs: 1.0,

@@ -345,8 +345,7 @@ impl SceneBuilder<'_> {
     ) -> Result<(), Discard> {
         for _ in 0..TRIES {
             let n_made = self.choices.made().len();
-            // A given position is used, so that cases and old runs with a blocked location stay as
-            // they are.
+            // A given position is used: a case may block a location.
             let is_given = [ObjectAxis::X, ObjectAxis::Y]
                 .into_iter()
                 .any(|axis| self.choices.is_recorded(&ChoiceName::Object(object, axis)));

@@ -89,7 +89,7 @@ impl World {
             rests_on: carriers.into_iter().collect(),
             asleep: body.is_some_and(rapier3d::prelude::RigidBody::is_sleeping)
                 || self.has_left(idx),
-            size_m: Some(object.model.size_m),
+            size_m: object.model.size_m,
             grasp_distance_m: None,
             part: object.attached.as_ref().and_then(|attached| {
                 Some((

@@ -239,7 +239,7 @@ impl World {
             robot: RobotCourse {
                 clearances: self.clearances(),
                 motion: self.end_motion(),
-                intervals: Some(samples.intervals()),
+                intervals: samples.intervals(),
                 samples,
                 ..self.end_robot_course()
             },

@@ -132,10 +132,10 @@ impl World {
                 pair,
                 start_secs: self.recorder.secs_since_begin(met.tick),
                 max_depth_m: met.max_depth_m,
-                press: Some(SelfPress {
+                press: SelfPress {
                     max_force_n: met.max_force_n,
                     of_hand,
-                }),
+                },
             }
         });
         let mut self_contacts: Vec<SelfCollision> = contacts.collect();

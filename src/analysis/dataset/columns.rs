@@ -74,7 +74,7 @@ const TIME: ColumnSpec = number(
 pub(super) const TAKEN_AT: ColumnSpec = number(
     "taken_at_s",
     "s",
-    "time of the picture since the action began; negative if an earlier action took it, missing in older runs",
+    "time of the picture since the action began; negative if an earlier action took it, missing without a picture of the simulated camera",
 );
 pub(super) const TAKEN_BASE_X: ColumnSpec =
     number("taken_base_x_m", "m", "true x of the base at that time");

@@ -150,18 +150,14 @@ const BASE: [&str; 6] = [
 ];
 const JOINT: [&str; 3] = ["position", "velocity", "effort"];
 
-/// Adds the course of each action of a run. Returns `false` if the trace has none, as in earlier
-/// versions.
-pub(super) fn add(run: &str, trace: &Trace, sheets: &mut Sheets) -> bool {
-    let mut any = false;
+/// Adds the course of each action of a run.
+pub(super) fn add(run: &str, trace: &Trace, sheets: &mut Sheets) {
     for (step, course) in (1usize..).zip(&trace.robot_courses) {
-        any |= course.samples.count > 0;
         add_samples(run, step, &course.samples, sheets);
     }
     for (step, action) in (1usize..).zip(&trace.actions) {
         add_phases(run, step, action, sheets);
     }
-    any
 }
 
 fn add_phases(run: &str, step: usize, action: &ActionTrace, sheets: &mut Sheets) {

@@ -194,15 +194,8 @@ pub(super) const SELF_CONTACTS: TableSpec = TableSpec {
             "m",
             "largest penetration depth where both are solid",
         ),
-        number(
-            "max_force_n",
-            "N",
-            "largest normal force; missing in runs of earlier versions",
-        ),
-        bool(
-            "of_hand",
-            "both belong to the hand, whose fingers may meet; missing in runs of earlier versions",
-        ),
+        number("max_force_n", "N", "largest normal force"),
+        bool("of_hand", "both belong to the hand, whose fingers may meet"),
     ],
 };
 

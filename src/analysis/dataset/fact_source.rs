@@ -110,7 +110,7 @@ fn body_cells(body: &BodyState, kinds: String, role: Option<&str>) -> Vec<Cell> 
         .into_iter()
         .chain(body.aabb_max)
         .map(Cell::number);
-    let size = (0..3).map(|axis| Cell::Number(body.size_m.map(|size| size[axis])));
+    let size = body.size_m.map(Cell::number);
     let motion = body
         .pose
         .position
@@ -147,7 +147,7 @@ fn add_events(
     for contact in &action.contacts {
         let pair = contact.pair.each_ref().map(Cell::text);
         let numbers = [contact.start_secs, contact.end_secs, contact.max_force_n].map(Cell::number);
-        let point = (0..3).map(|axis| Cell::Number(contact.point_m.map(|point| point[axis])));
+        let point = contact.point_m.map(Cell::number);
         sheets.push(
             &CONTACTS,
             place().into_iter().chain(pair).chain(numbers).chain(point),
@@ -156,8 +156,8 @@ fn add_events(
     for contact in course.into_iter().flat_map(|course| &course.self_contacts) {
         let pair = contact.pair.each_ref().map(Cell::text);
         let numbers = [contact.start_secs, contact.max_depth_m].map(Cell::number);
-        let force = Cell::Number(contact.press.map(|press| press.max_force_n));
-        let of_hand = Cell::Bool(contact.press.map(|press| press.of_hand));
+        let force = Cell::number(contact.press.max_force_n);
+        let of_hand = Cell::Bool(Some(contact.press.of_hand));
         sheets.push(
             &SELF_CONTACTS,
             place()
@@ -181,11 +181,7 @@ fn add_events(
                 .chain(numbers),
         );
     }
-    for interval in course
-        .and_then(|course| course.intervals.as_ref())
-        .into_iter()
-        .flatten()
-    {
+    for interval in course.into_iter().flat_map(|course| &course.intervals) {
         let kind = match interval.kind {
             IntervalKind::Hold => "hold",
             IntervalKind::Motion => "motion",

@@ -136,16 +136,14 @@ fn add_action(
     sheets.push(&ACTIONS, row.into_iter().chain(base));
 }
 
-/// Adds the robot's and the objects' motion. Returns `false` if the trace lacks the robot's motion,
-/// as in earlier versions.
-pub(super) fn add_courses(run: &str, trace: &Trace, sheets: &mut Sheets) -> bool {
+/// Adds the robot's and the objects' motion.
+pub(super) fn add_courses(run: &str, trace: &Trace, sheets: &mut Sheets) {
     // Poses are stored at the same times. The first pose of an action is the last of the previous
     // one.
-    let (mut frame, mut any) = (0usize, false);
+    let mut frame = 0usize;
     for (step, course) in (1usize..).zip(&trace.robot_courses) {
         let motion = &course.motion;
         for (number, moment) in motion.moments().enumerate() {
-            any = true;
             frame += usize::from(number > 0);
             let place = || {
                 [
@@ -195,7 +193,6 @@ pub(super) fn add_courses(run: &str, trace: &Trace, sheets: &mut Sheets) -> bool
             }
         }
     }
-    any
 }
 
 /// Converts an f32 to a cell. A number that is not finite becomes missing.

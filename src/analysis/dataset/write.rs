@@ -40,8 +40,6 @@ const COURSES: [&TableSpec; 3] = [&JOINTS, &ROBOT, &OBJECTS];
 pub struct Dataset {
     /// Number of runs.
     pub runs: usize,
-    /// Number of runs whose traces lack the robot's motion, because an earlier version stored them.
-    pub without_course: usize,
     /// Number of runs without motion, because simulating them again would start a program without
     /// consent.
     pub withheld: usize,
@@ -82,13 +80,11 @@ pub fn export_dataset(
         };
         source::add(run, &trace, sheets);
         fact_source::add(run, &trace, runs.hierarchy, sheets);
-        let any = source::add_courses(&run.row.run, &trace, sheets);
-        let is_whole = (!with_course || course::add(&run.row.run, &trace, sheets)) && any;
-        Ok(if is_whole {
-            Motion::Written
-        } else {
-            Motion::Unrecorded
-        })
+        source::add_courses(&run.row.run, &trace, sheets);
+        if with_course {
+            course::add(&run.row.run, &trace, sheets);
+        }
+        Ok(Motion::Written)
     })
 }
 
@@ -119,8 +115,6 @@ fn add_facts(
 enum Motion {
     /// It is.
     Written,
-    /// The trace has none: an earlier version stored it.
-    Unrecorded,
     /// Simulating it again would start a program without consent.
     Withheld,
 }
@@ -152,7 +146,6 @@ fn export(
             dataset.runs += 1;
             match add(&detail, &mut sheets)? {
                 Motion::Written => {}
-                Motion::Unrecorded => dataset.without_course += 1,
                 Motion::Withheld => dataset.withheld += 1,
             }
             sheets.make_room()?;

@@ -49,20 +49,20 @@ struct Blow<'a> {
     force_n: f64,
     by: &'a str,
     at_secs: f64,
-    /// Where the hardest contact was, in the world. `None` in traces of earlier versions.
-    point: Option<[f64; 2]>,
+    /// Where the hardest contact was, in the world.
+    point: [f64; 2],
 }
 
 /// Returns the things around the goal, in scene order.
 pub(super) fn of(view: &ActionView<'_>) -> Vec<Surrounding> {
     let mut blows: BTreeMap<&str, Blow<'_>> = BTreeMap::new();
     for Hit { contact, thing, by } in hits(view) {
-        let point = contact.point_m.map(|[x, y, _]| [x, y]);
+        let [x, y, _] = contact.point_m;
         let found = Blow {
             force_n: contact.max_force_n,
             by,
             at_secs: contact.start_secs,
-            point,
+            point: [x, y],
         };
         let known = blows.entry(thing).or_insert(found);
         let at_secs = known.at_secs.min(found.at_secs);
@@ -88,18 +88,12 @@ fn surrounding(
     frame: Option<&Frame>,
 ) -> Surrounding {
     let middle = [0, 1].map(|axis| (body.aabb_min[axis] + body.aabb_max[axis]) / 2.0);
-    // The middle of a large piece of furniture says little about the place of a contact; without
-    // the contact itself, the point nearest to the base is taken.
-    let point = |frame: &Frame| match blow {
-        Some(Blow {
-            point: Some(point), ..
-        }) if body.fixed => *point,
-        _ if body.fixed => {
-            [0, 1].map(|axis| frame.base[axis].clamp(body.aabb_min[axis], body.aabb_max[axis]))
-        }
+    // The middle of a large piece of furniture says little about the place of a contact.
+    let point = match blow {
+        Some(blow) if body.fixed => blow.point,
         _ => middle,
     };
-    let place = frame.map(|frame| frame.place(point(frame)));
+    let place = frame.map(|frame| frame.place(point));
     Surrounding {
         object: body.id.clone(),
         category: body.category.clone(),
@@ -117,8 +111,6 @@ fn surrounding(
 struct Frame {
     goal: [f64; 2],
     heading: f64,
-    /// Position of the base that gives the direction.
-    base: [f64; 2],
 }
 
 impl Frame {
@@ -132,12 +124,11 @@ impl Frame {
             .chain([view.before])
             .map(|state| state.robot.base_true);
         bases
-            .map(|[x, y, _]| ([x, y], [goal[0] - x, goal[1] - y]))
-            .find(|(_, way)| libm::hypot(way[0], way[1]) > AT_GOAL_M)
-            .map(|(base, way)| Self {
+            .map(|[x, y, _]| [goal[0] - x, goal[1] - y])
+            .find(|way| libm::hypot(way[0], way[1]) > AT_GOAL_M)
+            .map(|way| Self {
                 goal,
                 heading: libm::atan2(way[1], way[0]),
-                base,
             })
     }
 

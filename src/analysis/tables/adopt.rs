@@ -92,7 +92,7 @@ fn files_of(history: &History) -> Result<Vec<(String, String, PathBuf)>, Diagnos
     }
     let known = tables_in(&tables).into_iter().filter_map(|file| {
         let name = named(&file)?;
-        Some((name.campaign, name.digest?, file))
+        Some((name.campaign, name.digest, file))
     });
     Ok(known.collect())
 }

@@ -126,8 +126,8 @@ impl Mirror {
     }
 
     /// Returns the files of a history's mirror that are damaged or differ from the store and the
-    /// traces, sorted by name. Files of earlier versions, of runs that the store no longer has, and
-    /// from before a recheck are not compared: an update replaces them.
+    /// traces, sorted by name. Files of runs that the store no longer has, and from before a recheck
+    /// are not compared: an update replaces them.
     ///
     /// # Errors
     /// The history can't be read.
@@ -141,8 +141,7 @@ impl Mirror {
         let is_newest = |campaign: &String| before.get(campaign) == later.get(campaign);
         let mut damaged = Vec::new();
         for file in tables_in(&tables_of(history)) {
-            let is_of_today =
-                named(&file).is_none_or(|name| name.digest.is_some() && is_newest(&name.campaign));
+            let is_of_today = named(&file).is_none_or(|name| is_newest(&name.campaign));
             if is_of_today && !(is_whole(&file) && is_as_stored(history, &file, &known)?) {
                 damaged.push(file);
             }

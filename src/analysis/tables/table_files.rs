@@ -15,26 +15,17 @@ pub(super) fn tables_of(history: &History) -> PathBuf {
 pub(super) struct TableName {
     pub campaign: String,
     pub number: usize,
-    /// `None` in names of earlier versions.
-    pub digest: Option<String>,
+    pub digest: String,
 }
 
 pub(super) fn named(file: &Path) -> Option<TableName> {
     let stem = file.file_name()?.to_str()?.strip_suffix(".parquet")?;
-    let (rest, last) = stem.rsplit_once('.')?;
-    let of_today = rest.rsplit_once('.').and_then(|(campaign, number)| {
-        Some(TableName {
-            campaign: campaign.to_owned(),
-            number: number.parse().ok()?,
-            digest: Some(last.to_owned()),
-        })
-    });
-    of_today.or_else(|| {
-        Some(TableName {
-            campaign: rest.to_owned(),
-            number: last.parse().ok()?,
-            digest: None,
-        })
+    let (rest, digest) = stem.rsplit_once('.')?;
+    let (campaign, number) = rest.rsplit_once('.')?;
+    Some(TableName {
+        campaign: campaign.to_owned(),
+        number: number.parse().ok()?,
+        digest: digest.to_owned(),
     })
 }
 
@@ -44,8 +35,7 @@ pub(super) const LONGEST: u64 = 256 << 20;
 /// Reads a file that has the digest that its name says. The table library may panic on any other.
 pub(super) fn whole(file: &Path) -> std::io::Result<Vec<u8>> {
     let bytes = Below::new(file.parent().unwrap_or(file)).read(file, LONGEST)?;
-    let digest = named(file).and_then(|name| name.digest);
-    if digest.is_some_and(|digest| digest_of_bytes(&bytes) == digest) {
+    if named(file).is_some_and(|name| digest_of_bytes(&bytes) == name.digest) {
         return Ok(bytes);
     }
     Err(std::io::Error::other("it has changed since it was written"))

@@ -454,7 +454,7 @@ fn stand_near(course: &mut Retouch<'_>) -> Option<()> {
         ];
         person.aabb_min = [0, 1, 2].map(|axis| middle[axis] - SIZE_M[axis] / 2.0);
         person.aabb_max = [0, 1, 2].map(|axis| middle[axis] + SIZE_M[axis] / 2.0);
-        person.size_m = Some(SIZE_M);
+        person.size_m = SIZE_M;
         (person.touches, person.rests_on) = (Vec::new(), vec!["floor".to_owned()]);
         person.grasp_distance_m = None;
         snapshot.bodies.push(person);

@@ -257,12 +257,6 @@ const CODES_X: &[Code] = &[
         "name another port with `--port`, or 0 for any",
     ),
     code(
-        "X054",
-        "runs have no robot motion",
-        "an earlier version stored them",
-        "run the campaign again to record it",
-    ),
-    code(
         "X055",
         "this actcheck was built without recordings for Rerun",
         "the feature `rerun` is off by default",

@@ -30,9 +30,9 @@ const CODES_H: &[Code] = &[
     ),
     code(
         "H004",
-        "a newer actcheck wrote the history",
-        "the program is older than the history",
-        "update actcheck, or name another folder",
+        "a history has another format",
+        "another version of actcheck wrote it",
+        "use that version, or name another folder",
     ),
     code(
         "H005",

@@ -199,7 +199,7 @@ const CODES_S: &[Code] = &[
     code(
         "S066",
         "a candidate in a case is written as an index",
-        "an old version of the program exported the case, and the choice has several candidates",
+        "the choice has several candidates, whose order may change",
         "write the name of the candidate instead, as the help suggests",
     ),
     code(

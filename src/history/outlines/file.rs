@@ -4,12 +4,12 @@
 //! After the magic bytes, a table has the compressed size and the checksum of each part, and then
 //! its own checksum: four bytes each, the lowest first. Each part is compressed on its own, because
 //! most readers need only one. The statements are stored by property ([`crate::vertical`]), which
-//! has parts and checksums of its own. In files of the first format, they are one compressed part.
+//! has parts and checksums of its own.
 
 use oxigraph::model::Quad;
 
 use crate::inflate::read_expanded;
-use crate::journal::{self, Content, Part};
+use crate::journal::{self, Part};
 use crate::outlines::row::Rows;
 use crate::stored_run::StoredRun;
 use crate::trace_file;
@@ -19,9 +19,7 @@ use crate::{RunRecord, write_run};
 use actcheck_base::{ByteReader, put_varint};
 
 /// Magic bytes at the start of each file. The last one is the format version.
-const MAGIC: &[u8; 8] = b"acoutln2";
-/// Magic bytes of files whose statements are not stored by property.
-const AS_ROWS: &[u8; 8] = b"acoutln1";
+const MAGIC: &[u8; 8] = b"acoutln3";
 /// Position of the statements among the parts.
 const STATEMENTS: usize = 2;
 /// Number of parts.
@@ -73,40 +71,19 @@ pub(super) fn encode(outlines: &[Outline]) -> Result<Vec<u8>, String> {
         .iter()
         .map(|outline| outline.quads.as_slice())
         .collect();
-    let by_property = vertical::encode(&quads)?;
-    let as_rows = || {
-        let statements = journal::numbered(quads.iter().copied().flatten());
-        let counts: Vec<u32> = quads.iter().map(|quads| quads.len() as u32).collect();
-        postcard::to_stdvec(&(statements, counts)).map_err(fault)
-    };
+    let statements = vertical::encode(&quads)?;
     let heads: Vec<&[u8]> = outlines
         .iter()
         .map(|outline| outline.head.as_slice())
         .collect();
     let parts = [
-        indices,
-        postcard::to_stdvec(&rows).map_err(fault)?,
-        if by_property.is_some() {
-            Vec::new()
-        } else {
-            as_rows()?
-        },
-        postcard::to_stdvec(&heads).map_err(fault)?,
+        compressed(&indices)?,
+        compressed(&postcard::to_stdvec(&rows).map_err(fault)?)?,
+        statements,
+        compressed(&postcard::to_stdvec(&heads).map_err(fault)?)?,
     ];
-    let (mut bytes, mut body) = (
-        if by_property.is_some() {
-            MAGIC
-        } else {
-            AS_ROWS
-        }
-        .to_vec(),
-        Vec::new(),
-    );
-    for (at, part) in parts.into_iter().enumerate() {
-        let part = match &by_property {
-            Some(statements) if at == STATEMENTS => statements.clone(),
-            _ => zstd::bulk::compress(&part, LEVEL).map_err(|error| error.to_string())?,
-        };
+    let (mut bytes, mut body) = (MAGIC.to_vec(), Vec::new());
+    for part in parts {
         let size = u32::try_from(part.len()).map_err(|_| "it is larger than 4 GB".to_owned())?;
         bytes.extend(size.to_le_bytes());
         bytes.extend(journal::sum_of(&part).to_le_bytes());
@@ -117,12 +94,14 @@ pub(super) fn encode(outlines: &[Outline]) -> Result<Vec<u8>, String> {
     Ok(bytes)
 }
 
+fn compressed(part: &[u8]) -> Result<Vec<u8>, String> {
+    zstd::bulk::compress(part, LEVEL).map_err(|error| error.to_string())
+}
+
 /// The parts of a file, compressed.
 pub(super) struct Opened<'a> {
     parts: [&'a [u8]; PARTS],
     sums: [u32; PARTS],
-    /// Whether the statements are not stored by property.
-    as_rows: bool,
 }
 
 impl<'a> Opened<'a> {
@@ -133,7 +112,7 @@ impl<'a> Opened<'a> {
     pub(super) fn new(bytes: &'a [u8]) -> Result<Self, String> {
         let (header, mut rest) = bytes.split_at_checked(HEADER).ok_or("it ends too early")?;
         let (magic, table) = header.split_at(MAGIC.len());
-        if magic != MAGIC && magic != AS_ROWS {
+        if magic != MAGIC {
             return Err("it has no outlines of this format".to_owned());
         }
         let number = |at: usize| {
@@ -151,11 +130,7 @@ impl<'a> Opened<'a> {
                 .unwrap_or((&[], &[]));
             parts[at] = part;
         }
-        Ok(Self {
-            parts,
-            sums,
-            as_rows: magic == AS_ROWS,
-        })
+        Ok(Self { parts, sums })
     }
 
     /// Size of the file up to the end of its first `parts` parts. Unit: bytes.
@@ -209,34 +184,16 @@ impl<'a> Opened<'a> {
 
     /// Adds the wanted statements of its runs.
     pub(super) fn add_statements(&self, wanted: &Wanted, part: &mut Part) -> Result<(), String> {
-        if !self.as_rows {
-            let properties = wanted.properties();
-            let quads = self.by_property()?.statements(properties.as_deref())?;
-            part.quads
-                .extend(quads.into_iter().flatten().filter(|quad| wanted.has(quad)));
-            return Ok(());
-        }
-        let bytes = self.part(STATEMENTS)?;
-        let ((terms, rows), _): (Content<'_>, Vec<u32>) =
-            postcard::from_bytes(&bytes).map_err(unread)?;
-        journal::collect(&terms, &rows, wanted, part).ok_or_else(|| CHANGED.to_owned())
+        let properties = wanted.properties();
+        let quads = self.by_property()?.statements(properties.as_deref())?;
+        part.quads
+            .extend(quads.into_iter().flatten().filter(|quad| wanted.has(quad)));
+        Ok(())
     }
 
     /// The statements about each run.
     pub(super) fn statements(&self) -> Result<Vec<Vec<Quad>>, String> {
-        if !self.as_rows {
-            return self.by_property()?.statements(None);
-        }
-        let bytes = self.part(STATEMENTS)?;
-        let ((terms, rows), counts): (Content<'_>, Vec<u32>) =
-            postcard::from_bytes(&bytes).map_err(unread)?;
-        let mut part = Part::default();
-        journal::collect(&terms, &rows, &Wanted::all(), &mut part).ok_or(CHANGED)?;
-        let mut quads = part.quads.into_iter();
-        Ok(counts
-            .into_iter()
-            .map(|count| quads.by_ref().take(count as usize).collect())
-            .collect())
+        self.by_property()?.statements(None)
     }
 
     fn by_property(&self) -> Result<Sheet<&'a [u8]>, String> {
@@ -244,12 +201,11 @@ impl<'a> Opened<'a> {
         Sheet::open(bytes, bytes.len())
     }
 
-    /// Whether the statements are stored by property, and where they are in the file. `header`: its
-    /// first bytes.
-    pub(super) fn statements_at(header: &[u8]) -> Result<(bool, std::ops::Range<usize>), String> {
-        let opened = Opened::new(header)?;
+    /// The place of the statements in the file. `header`: its first bytes.
+    pub(super) fn statements_at(header: &[u8]) -> Result<std::ops::Range<usize>, String> {
+        Opened::new(header)?;
         let end = |parts: usize| Self::size_of_start(header, parts).ok_or(CHANGED);
-        Ok((!opened.as_rows, end(STATEMENTS)?..end(STATEMENTS + 1)?))
+        Ok(end(STATEMENTS)?..end(STATEMENTS + 1)?)
     }
 
     /// The choices and states of all runs, encoded.

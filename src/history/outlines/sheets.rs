@@ -9,7 +9,7 @@ use crate::History;
 use crate::folder;
 use crate::outlines::file::{HEADER, Opened};
 use crate::outlines::shelf::{Unread, unread};
-use crate::vertical::{self, Sheet, Source, Stop};
+use crate::vertical::{Sheet, Source, Stop};
 
 /// A file of outlines with its statements by property.
 #[derive(Debug, Clone)]
@@ -42,7 +42,7 @@ impl Source for InFile {
 }
 
 impl SheetFile {
-    /// Opens its statements. Files of an earlier format are read whole.
+    /// Opens its statements.
     ///
     /// # Errors
     /// It is gone or damaged.
@@ -53,7 +53,7 @@ impl SheetFile {
         };
         let (header, file) = read().map_err(|error| stop(unread(&self.path, &error)))?;
         let damaged = |why| Stop::Damaged(self.path.clone(), why);
-        let (by_property, place) = Opened::statements_at(&header).map_err(damaged)?;
+        let place = Opened::statements_at(&header).map_err(damaged)?;
         let length = place.len();
         if file
             .metadata()
@@ -61,24 +61,12 @@ impl SheetFile {
         {
             return Err(damaged("it ends too early".to_owned()));
         }
-        if by_property {
-            let source = InFile {
-                file,
-                start: place.start,
-                length,
-            };
-            return Sheet::open(Box::new(source) as Box<dyn Source>, length).map_err(damaged);
-        }
-        let bytes = folder::read(&self.path).map_err(|error| stop(unread(&self.path, &error)))?;
-        let runs = Opened::new(&bytes)
-            .and_then(|opened| opened.statements())
-            .map_err(damaged)?;
-        let runs: Vec<&[oxigraph::model::Quad]> = runs.iter().map(Vec::as_slice).collect();
-        let Some(bytes) = vertical::encode(&runs).map_err(damaged)? else {
-            return Err(Stop::Unfit("outlines of unusual runs".to_owned()));
+        let source = InFile {
+            file,
+            start: place.start,
+            length,
         };
-        let length = bytes.len();
-        Sheet::open(Box::new(bytes) as Box<dyn Source>, length).map_err(damaged)
+        Sheet::open(Box::new(source) as Box<dyn Source>, length).map_err(damaged)
     }
 }
 

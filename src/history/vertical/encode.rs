@@ -39,15 +39,12 @@ pub(super) struct PartSize {
     pub statements: u32,
 }
 
-/// Encodes the statements about each run. Returns `None` if they differ from those of a run too
-/// much.
+/// Encodes the statements about each run.
 ///
 /// # Errors
-/// A message, if a part can't be encoded.
-pub(crate) fn encode(runs: &[&[Quad]]) -> Result<Option<Vec<u8>>, String> {
-    let Some(read) = Read::of(runs) else {
-        return Ok(None);
-    };
+/// A message, if they are not those of runs of one campaign, or if a part can't be encoded.
+pub(crate) fn encode(runs: &[&[Quad]]) -> Result<Vec<u8>, String> {
+    let read = Read::of(runs).ok_or("its statements are not those of runs of one campaign")?;
     let (mut body, mut columns) = (Vec::new(), Vec::new());
     let mut add = |part: &[u8], statements: usize| {
         let part = zstd::bulk::compress(part, LEVEL).map_err(|error| error.to_string())?;
@@ -75,7 +72,7 @@ pub(crate) fn encode(runs: &[&[Quad]]) -> Result<Option<Vec<u8>>, String> {
     bytes.extend(journal::sum_of(&directory).to_le_bytes());
     bytes.extend(directory);
     bytes.extend(body);
-    Ok(Some(bytes))
+    Ok(bytes)
 }
 
 /// The object of a statement.

@@ -197,8 +197,7 @@ fn set_trajectories(pack: &mut Pack, trace: &Trace, slots: &[usize]) {
     pack.set("courses", trajectories);
 }
 
-/// The hardest contact of the robot with something that it is not to touch, if its position is
-/// known.
+/// The hardest contact of the robot with something that it is not to touch.
 fn pressed(run: &RunDetail, trace: &Trace) -> Value {
     let judged = run.actions.iter().enumerate().flat_map(|(idx, action)| {
         let failed = action
@@ -207,10 +206,9 @@ fn pressed(run: &RunDetail, trace: &Trace) -> Value {
             .filter(|judgement| judgement.outcome == Outcome::Failed);
         failed.map(move |judgement| (idx, judgement.witness.as_str()))
     });
-    let found = hardest_of_run(trace, judged).and_then(|pressed| Some((pressed.point_m?, pressed)));
-    found.map_or(
+    hardest_of_run(trace, judged).map_or(
         Value::Null,
-        |(at, pressed)| json!({ "at": at, "label": pressed.label(), "told": pressed.sentence(), "secs": pressed.secs }),
+        |pressed| json!({ "at": pressed.point_m, "label": pressed.label(), "told": pressed.sentence(), "secs": pressed.secs }),
     )
 }
 

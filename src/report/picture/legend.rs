@@ -77,10 +77,7 @@ fn entries(data: &PanelData<'_>) -> Vec<(Sample, &'static str)> {
         .actions
         .iter()
         .any(|action| !action.percepts.is_empty() || action.perceived.is_some());
-    let pressed = data
-        .pressed
-        .as_ref()
-        .is_some_and(|pressed| pressed.point_m.is_some());
+    let pressed = data.pressed.is_some();
     let all = [
         (
             has(Role::Target),

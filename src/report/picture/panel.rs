@@ -168,14 +168,10 @@ fn heading(drawing: &mut Drawing, [x, y, heading]: [f64; 3], window: &Window) {
 
 /// Draws a star at the hardest contact, with its label.
 fn press(drawing: &mut Drawing, data: &PanelData<'_>, window: &Window, labels: &mut Labels) {
-    let Some((pressed, point)) = data
-        .pressed
-        .as_ref()
-        .and_then(|pressed| Some((pressed, pressed.point_m?)))
-    else {
+    let Some(pressed) = &data.pressed else {
         return;
     };
-    let [x, y] = window.pixel(point);
+    let [x, y] = window.pixel(pressed.point_m);
     drawing.polygon(star([x, y], STAR_PX), paint::PRESSED);
     let at = Rect {
         left: x,

@@ -61,7 +61,7 @@ pub fn run_picture(caption: &Caption, trace: &Trace) -> Option<Drawing> {
     let close_ups = close_ups(
         trace,
         &subjects,
-        data.pressed.as_ref().and_then(|pressed| pressed.point_m),
+        data.pressed.as_ref().map(|pressed| pressed.point_m),
     )?;
     let base_path: Vec<[f64; 3]> = paths
         .iter()

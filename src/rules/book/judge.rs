@@ -15,7 +15,7 @@ use crate::model::program::{Predicates, Scope};
 use crate::model::universe::Universe;
 #[cfg(feature = "sparql")]
 use crate::sparql::{dataset::Statements, query::Query, snapshot::snapshot};
-use crate::temporal::{NO_INTERVALS, UNRECORDED, lacks_intervals};
+use crate::temporal::UNRECORDED;
 use actcheck_base::{ActionFacts, Diagnostics, Findings, RuleFault, Term, Terms};
 
 /// Every property's rules with the libraries, parsed, checked and planned. Shared between threads.
@@ -95,8 +95,6 @@ pub(crate) enum JudgeRules {
         verdict: Verdict,
         /// Whether its rules read quantities over time.
         reads_course: bool,
-        /// Whether its rules read holds or motions.
-        reads_intervals: bool,
         /// Whether its pass may depend on the right side of an `implies`.
         implies: bool,
         /// Scope of the file's predicates.
@@ -106,19 +104,6 @@ pub(crate) enum JudgeRules {
     },
     #[cfg(feature = "sparql")]
     Sparql(Box<Query>),
-}
-
-impl JudgeRules {
-    /// Returns whether the rules read holds or motions, which runs of earlier versions lack.
-    pub(crate) fn reads_intervals(&self) -> bool {
-        match self {
-            Self::Datalog {
-                reads_intervals, ..
-            } => *reads_intervals,
-            #[cfg(feature = "sparql")]
-            Self::Sparql(query) => query.reads_intervals,
-        }
-    }
 }
 
 impl RuleBook {
@@ -155,7 +140,6 @@ impl RuleBook {
         };
         #[cfg(feature = "sparql")]
         let graphs = std::cell::OnceCell::new();
-        let lacks_intervals = lacks_intervals(facts);
         let mut results = BTreeMap::new();
         let label = universe.next_label();
         for iri in properties {
@@ -163,9 +147,6 @@ impl RuleBook {
             universe.label_from(label);
             let judge = self.properties.get(iri);
             let result = match judge {
-                Some(judge) if lacks_intervals && judge.rules.reads_intervals() => {
-                    Err(RuleFault::Value(NO_INTERVALS.to_owned()))
-                }
                 None => Err(RuleFault::Value(format!("unknown property {iri}"))),
                 Some(Judge {
                     rules:

@@ -29,9 +29,7 @@ use crate::model::universe::Universe;
 #[cfg(feature = "sparql")]
 use crate::sparql::{dataset::Statements, query::Query, unchanging::is_unchanging};
 use crate::syntax::{Syntax, parse};
-use crate::temporal::{
-    IntervalTerms, add_margin, add_moment, define_moment, mark_consequents, reads_course,
-};
+use crate::temporal::{add_margin, add_moment, define_moment, mark_consequents, reads_course};
 use actcheck_base::{Diagnostic, Diagnostics, Digest, Term, TermId, Terms};
 use actcheck_ontology::{Ontology, Property, RuleLanguage};
 
@@ -186,12 +184,8 @@ impl Preparing {
             .values()
             .any(|p| p.rule.language == RuleLanguage::Sparql);
         let library = self.stratified(library, &predicates);
-        let intervals = IntervalTerms::new(&self.terms);
-        let reads_intervals = |rule: &Rule| intervals.in_rule(rule, &predicates);
         let library = {
-            let reads = |rule: &Rule| {
-                !gathers_state(rule) && (reads_course(rule, &predicates) || reads_intervals(rule))
-            };
+            let reads = |rule: &Rule| !gathers_state(rule) && reads_course(rule, &predicates);
             let (timed, rest) = split_timed(library, reads);
             self.only_own_predicates(&timed, &predicates);
             for program in programs.values_mut() {
@@ -231,13 +225,11 @@ impl Preparing {
                 .as_ref()
                 .is_some_and(|decisive| mark_consequents(&mut program, decisive));
             let reads_course = program_reads_course(&program);
-            let reads_intervals = program.rules.iter().any(reads_intervals);
             let planned = Box::new(self.plan(program, &predicates, &mut indexes));
             let rules = JudgeRules::Datalog {
                 planned,
                 verdict,
                 reads_course,
-                reads_intervals,
                 implies,
                 scope: *scope,
                 prefixes: syntax.prefixes.clone(),
@@ -423,8 +415,8 @@ impl Preparing {
         {
             let name = &predicates.get(rule.head.predicate).name;
             let message = format!("`{name}` can't depend on the course of the action");
-            let help = "derive a predicate with a name of its own: every property reads the snapshots, and runs of \
-                        earlier versions have no course";
+            let help = "derive a predicate with a name of its own: every property reads the snapshots, with a course or \
+                        without";
             let place = rule.head.span.clone();
             self.diagnostics.push(
                 Diagnostic::error("R053", message)

@@ -12,7 +12,6 @@ use crate::explain::model::Explanation;
 use crate::explain::proof::Prover;
 use crate::explain::search::{ProofContext, stated_facts};
 use crate::model::universe::Universe;
-use crate::temporal::{NO_INTERVALS, lacks_intervals};
 use actcheck_base::{ActionFacts, Findings, RuleFault};
 
 impl RuleBook {
@@ -54,9 +53,6 @@ impl RuleBook {
         budget: &Budget,
     ) -> Result<Explanation, RuleFault> {
         let judge = self.property(property)?;
-        if judge.rules.reads_intervals() && lacks_intervals(facts) {
-            return Err(RuleFault::Value(NO_INTERVALS.to_owned()));
-        }
         match &judge.rules {
             JudgeRules::Datalog {
                 planned, verdict, ..

@@ -19,7 +19,6 @@ use crate::sparql::dataset::{Snapshot, Statements, View, length_of};
 use crate::sparql::ledger::Ledger;
 use crate::sparql::query_text::{first_group, groups, scan, variables};
 use crate::sparql::varying::varying;
-use crate::temporal::named_in;
 use crate::watch::Watch;
 use actcheck_base::{
     COUNTED_TEXT, Diagnostic, Diagnostics, Findings, MOST_NESTED_CALLS, RuleFault, Severity,
@@ -33,8 +32,6 @@ pub(crate) struct Query {
     prepared: PreparedSparqlQuery,
     /// Whether it is an `ASK` query, which passes if it is true.
     pub(crate) asks: bool,
-    /// Whether it reads holds or motions.
-    pub(crate) reads_intervals: bool,
     /// Warnings about it.
     pub(crate) warnings: Diagnostics,
     /// Name of its file.
@@ -97,7 +94,6 @@ impl Query {
             prepared,
             warnings,
             asks: form == Some(QueryForm::Ask),
-            reads_intervals: named_in(&source.text),
             file: source.name.to_string(),
         })
     }

@@ -6,7 +6,6 @@ mod deciding;
 mod evidence;
 mod formula;
 mod gap;
-mod intervals;
 mod margin;
 mod moment;
 mod quantities;
@@ -16,9 +15,6 @@ mod windows;
 
 pub(crate) use evidence::Evidence;
 pub(crate) use formula::{CheckedFormula, Quantity, Thing, Timed};
-#[cfg(feature = "sparql")]
-pub(crate) use intervals::named_in;
-pub(crate) use intervals::{IntervalTerms, NO_INTERVALS, lacks_intervals};
 pub(crate) use margin::{add_margin, reads_course};
 pub(crate) use moment::{add_moment, define_moment};
 pub(crate) use quantities::{known_quantity, quantity_names, things_of, values_of};

@@ -16,7 +16,7 @@ use std::borrow::Cow;
 use std::rc::Rc;
 
 /// Why a run can't be judged by a rule about time.
-pub(crate) const UNRECORDED: &str = "the course of the action was not recorded: the run is of an earlier version; run the campaign again";
+pub(crate) const UNRECORDED: &str = "the course of the action was not recorded: the action has no samples, or its motion was not kept";
 
 /// Reads formulas under one binding of a rule's variables.
 pub(super) struct Reader<'a> {

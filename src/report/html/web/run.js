@@ -49,7 +49,7 @@ async function watch(known, place, details, { runs, run, id, address }) {
   fill(details, replay.actions.map((action) => [action.perceived && action.judged.some(told) && make("p", { class: "perceived" }, `${action.perceived}.`),
     action.judged.filter(told).map((judged) => explained(action, judged, seek))]), actionsOf(replay), allOutcomes(runs, run), objectTable(replay), discards(replay));
   if (!replay.courses || !replay.courses.frames) {
-    return fill(place, make("p", { class: "note" }, replay.reason ? `The run was ${runs.text(runs.status, run)}: ${replay.reason}` : "The trace of this run is missing, corrupt, or was written by an earlier version of the program."));
+    return fill(place, make("p", { class: "note" }, replay.reason ? `The run was ${runs.text(runs.status, run)}: ${replay.reason}` : "The trace of this run is missing or corrupt."));
   }
   // The moment of the first sentence beside the picture; of a run in which nothing failed, its beginning.
   const first = replay.actions.flatMap((action) => action.judged).filter(told).map((judged) => judged.stated).find((secs) => typeof secs === "number");
