@@ -110,11 +110,6 @@ impl RunQuads {
             by_value,
         }
     }
-
-    /// The statements, in their order.
-    pub(super) fn into_quads(self) -> Vec<Quad> {
-        self.quads
-    }
 }
 
 impl QuadSource for RunQuads {
