@@ -54,11 +54,16 @@ struct CommonOption {
     help: &'static str,
 }
 
-const COMMON: [CommonOption; 4] = [
+const COMMON: [CommonOption; 5] = [
     CommonOption {
         name: "history",
         value: Some("DIR"),
         help: "Folder of the history [default: `.actcheck` beside the configuration, here, or the only one in a subfolder]",
+    },
+    CommonOption {
+        name: "campaign",
+        value: Some("ID"),
+        help: "Only the runs of this campaign; by default, analyses leave out shrunk runs, repeated failed runs and cases",
     },
     CommonOption {
         name: "ontology",
@@ -144,7 +149,8 @@ fn common_options() -> String {
         Some(width) => list.term_width(width),
         None => list,
     };
-    list.args(arguments).render_help().ansi().to_string()
+    let text = list.args(arguments).render_help().ansi().to_string();
+    text.trim_end().to_owned()
 }
 
 /// The program with all commands except the hidden ones, for completions and the manual.

@@ -49,7 +49,7 @@ impl Address {
         if authority.as_str().contains('@') {
             return wrong(
                 "it contains a name or a password, which other processes could read",
-                "set ACTCHECK_SPARQL_USER and ACTCHECK_SPARQL_PASSWORD, or use `--netrc`",
+                "set ACTCHECK_SPARQL_USER and ACTCHECK_SPARQL_PASSWORD",
             );
         }
         if authority.host().is_empty() {
