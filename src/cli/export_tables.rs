@@ -10,7 +10,7 @@ use crate::{output, restore};
 use actcheck_analysis::{
     Dataset, DatasetRuns, Mirror, export_csv, export_dataset, export_facts, export_parquet,
 };
-use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_base::Diagnostics;
 
 /// `actcheck export tables`
 #[derive(Debug, Args)]
