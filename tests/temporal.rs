@@ -165,6 +165,15 @@ fn shipped_properties_about_time_are_decided_as_their_descriptions_say() {
                     .add_turtle(When::Before, &turtle(text))
                     .expect("the facts are Turtle");
             }
+            // The robot moved.
+            facts.add(
+                When::During,
+                [
+                    Term::iri(names::w("joint/arm_lift_joint")),
+                    Term::iri(names::w("maxSpeedShare")),
+                    Term::Double(0.5),
+                ],
+            );
             facts.set_course(course_of(case).expect("a case has signals"));
             let mut found = book.judge(&facts.as_action(), &[names::act(name)], &Budget::default());
             let found = found.remove(&names::act(name)).expect("it was judged");
