@@ -261,7 +261,7 @@ fn bash_completes_commands_and_options() {
     for (line, offered) in [
         ("actcheck rech", "recheck"),
         ("actcheck run --unt", "--until-width"),
-        ("actcheck new c", "campaign"),
+        ("actcheck new ca", "campaign"),
     ] {
         let words: Vec<&str> = line.split(' ').collect();
         let ask = format!(
