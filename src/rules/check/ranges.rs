@@ -233,10 +233,16 @@ fn opposites(rule: &Rule, diagnostics: &mut Diagnostics) {
     let found = compared_variables(rule)
         .or_else(|| two_constants(rule))
         .or_else(|| required_and_excluded(rule));
-    if let Some((message, span)) = found {
-        let help = match message.ends_with("itself") {
-            true => "compare it with another variable or a number",
-            false => "`,` means and: for or, write one rule for each case",
+    if let Some(Contradiction {
+        message,
+        with_itself,
+        span,
+    }) = found
+    {
+        let help = if with_itself {
+            "compare it with another variable or a number"
+        } else {
+            "`,` means and: for or, write one rule for each case"
         };
         diagnostics.push(
             Diagnostic::error("R044", message)
@@ -246,7 +252,15 @@ fn opposites(rule: &Rule, diagnostics: &mut Diagnostics) {
     }
 }
 
-fn compared_variables(rule: &Rule) -> Option<(String, Span)> {
+/// Conditions that exclude each other.
+struct Contradiction {
+    message: String,
+    /// Whether a variable is compared with itself.
+    with_itself: bool,
+    span: Span,
+}
+
+fn compared_variables(rule: &Rule) -> Option<Contradiction> {
     // Which of less, equal and greater are left for each pair.
     let mut left: BTreeMap<(Variable, Variable), [bool; 3]> = BTreeMap::new();
     for literal in &rule.body {
@@ -288,13 +302,17 @@ fn compared_variables(rule: &Rule) -> Option<(String, Span)> {
                     "this can never hold: the comparisons of `?{a}` with `?{b}` exclude each other"
                 ),
             };
-            return Some((message, span.clone()));
+            return Some(Contradiction {
+                message,
+                with_itself: a == b,
+                span: span.clone(),
+            });
         }
     }
     None
 }
 
-fn two_constants(rule: &Rule) -> Option<(String, Span)> {
+fn two_constants(rule: &Rule) -> Option<Contradiction> {
     let mut equal: BTreeMap<Variable, &Term> = BTreeMap::new();
     for literal in &rule.body {
         let Literal::Compare {
@@ -314,16 +332,17 @@ fn two_constants(rule: &Rule) -> Option<(String, Span)> {
         let first = equal.entry(*variable).or_insert(term);
         if first.number().is_none() && *first != term {
             let name = &rule.variables[*variable];
-            return Some((
-                format!("this can never hold: `?{name}` is `{first}` and `{term}`"),
-                span.clone(),
-            ));
+            return Some(Contradiction {
+                message: format!("this can never hold: `?{name}` is `{first}` and `{term}`"),
+                with_itself: false,
+                span: span.clone(),
+            });
         }
     }
     None
 }
 
-fn required_and_excluded(rule: &Rule) -> Option<(String, Span)> {
+fn required_and_excluded(rule: &Rule) -> Option<Contradiction> {
     let positive = |atom: &Atom| {
         rule.body.iter().any(|literal| match literal {
             Literal::Positive(other) => {
@@ -337,7 +356,11 @@ fn required_and_excluded(rule: &Rule) -> Option<(String, Span)> {
             let message =
                 "this can never hold: the same condition is required and, with `~`, excluded"
                     .to_owned();
-            Some((message, atom.span.clone()))
+            Some(Contradiction {
+                message,
+                with_itself: false,
+                span: atom.span.clone(),
+            })
         }
         _ => None,
     })
