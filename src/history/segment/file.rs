@@ -364,6 +364,7 @@ mod tests {
         let segment = Segment::open(below, folder, 1)?;
         for (index, row) in (0..).zip(segment.rows()) {
             assert_eq!(segment.run(row)?, sample(index));
+            assert_eq!(row.scene(), sample(index).scene_digest());
             assert_eq!(segment.states(row)?, states(index));
             let motion = (index % 2 == 0).then(|| vec![index as u8; 100]);
             assert_eq!(segment.motion(row)?, motion);
