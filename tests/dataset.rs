@@ -1,5 +1,5 @@
-//! `actcheck export tables --dataset`: its contents, read by an independent reader, and their agreement
-//! with the history.
+//! `actcheck export tables --dataset`: its contents, read by an independent reader, and their
+//! agreement with the history.
 
 use std::path::Path;
 use std::process::{Command, Output};

@@ -31,11 +31,15 @@ fn varied(facts: &RunFacts, dice: &mut Dice) -> RunFacts {
         .filter(|_| dice.share() < 0.1)
         .collect();
     during[0].retain(|triple| !left_out.contains(&triple[0]));
+    let clearance = Term::iri(names::w("clearance"));
     let mut vary = |triple: &mut Triple| {
         if let Term::Double(value) = terms.term(triple[2])
             && dice.share() < share
         {
             let value = value + largest * (2.0 * dice.share() - 1.0);
+            // The smallest distance to a thing is never negative.
+            let is_distance = terms.id(&clearance) == Some(triple[1]);
+            let value = if is_distance { value.max(0.0) } else { value };
             triple[2] = terms.intern(Term::Double(value));
         }
     };

@@ -128,7 +128,8 @@ fn in_the_way(scene: &Scene) -> Vec<(String, String)> {
     of_role(scene, Role::Obstacle).flat_map(near).collect()
 }
 
-/// Regression: in 15 of 70 scenes, an obstacle was on a location, in 7 on the goal itself: the robot could only report that its goal was occupied.
+/// Regression: in 15 of 70 scenes, an obstacle was on a location, in 7 on the goal itself: the
+/// robot could only report that its goal was occupied.
 #[test]
 fn no_obstacle_of_the_shipped_task_is_on_a_location() {
     let shipped = scenes(&space_of(&root().join("configs/pick_and_place.toml")), 200);

@@ -83,8 +83,8 @@ pub enum Command {
     /// and `replay` use the campaign's own. In queries, the newest outcomes are those in the graph
     /// act:rechecked that no other supersedes (see ontology/history.ttl).
     ///
-    /// `--ontology` also takes a folder with the rules of another version, such as an older checkout:
-    /// with `ontology/actions.ttl` or `actions.ttl`.
+    /// `--ontology` also takes a folder with the rules of another version, such as an older
+    /// checkout: with `ontology/actions.ttl` or `actions.ttl`.
     ///
     /// Exit code: 0 no property fails now, 1 a property fails now, 2 the recheck failed or nothing
     /// could be decided, 130 interrupted by Ctrl-C (judgements so far are kept).

@@ -24,9 +24,9 @@ pub struct ServeArgs {
     /// given several times)
     #[arg(long, value_name = "NAME")]
     pub allow_host: Vec<String>,
-    /// Limits, such as `time=30s,rows=1000`: time, rows or triples, and size of an answer
-    /// [default: time=10s,rows=100000,size=50MB]; memory of a query [default: memory=2GB]; processes
-    /// for queries that are not light, while others wait [default: processes=4]
+    /// Limits, such as `time=30s,rows=1000`: time, rows or triples, and size of an answer [default:
+    /// time=10s,rows=100000,size=50MB]; memory of a query [default: memory=2GB]; processes for
+    /// queries that are not light, while others wait [default: processes=4]
     #[arg(long, value_name = "KEY=VALUE,…", value_delimiter = ',', value_parser = Limit::parse)]
     pub limits: Vec<Limit>,
     /// The folder of the history.

@@ -491,7 +491,8 @@ impl LinkSolids {
         self.solids.iter().map(|solid| (&solid.shape, &solid.pose))
     }
 
-    /// Returns the shapes as [`LinkSolids::shapes`], each with its index among the shapes of the link.
+    /// Returns the shapes as [`LinkSolids::shapes`], each with its index among the shapes of the
+    /// link.
     pub(crate) fn parts(&self) -> impl Iterator<Item = (usize, &SharedShape, &EnginePose)> {
         self.solids
             .iter()

@@ -126,8 +126,8 @@ impl Mirror {
     }
 
     /// Returns the files of a history's mirror that are damaged or differ from the store and the
-    /// traces, sorted by name. Files of runs that the store no longer has, and from before a recheck
-    /// are not compared: an update replaces them.
+    /// traces, sorted by name. Files of runs that the store no longer has, and from before a
+    /// recheck are not compared: an update replaces them.
     ///
     /// # Errors
     /// The history can't be read.

@@ -172,8 +172,8 @@ pub(crate) fn checked(
     if triangles.len() > MOST_TRIANGLES {
         return Err(MeshFileFault::TooManyTriangles(triangles.len()));
     }
-    let invalid = |fault| MeshFileFault::Mesh(format!("{fault}"));
-    let welded = Mesh::new(vertices, triangles).map_err(invalid)?.welded();
+    let mesh = Mesh::new(vertices, triangles).map_err(MeshFileFault::Mesh)?;
+    let welded = mesh.welded();
     Mesh::new(welded.vertices, welded.triangles).map_err(invalid)
 }
 

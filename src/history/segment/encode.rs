@@ -1,7 +1,7 @@
 //! A run as the contents of two frames: its values in lists, and all others.
 //!
-//! Texts that are alike in many runs are stored once in a segment: the frame in which one occurs
-//! first holds it, later ones its number.
+//! TextTable that are alike in many runs are stored once in a segment: the frame in which one
+//! occurs first holds it, later ones its number.
 
 use std::collections::HashMap;
 
@@ -16,15 +16,15 @@ use actcheck_data::Quality;
 /// Where the other frames of a run are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Places {
-    pub details: Place,
-    pub states: Place,
+    pub details: FramePlace,
+    pub states: FramePlace,
     /// `None` if its motion is not kept.
-    pub motion: Option<Place>,
+    pub motion: Option<FramePlace>,
 }
 
 /// The values of a run in lists.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Row {
+pub(crate) struct RunEntry {
     /// Position in the campaign, from 0.
     pub index: u64,
     pub repetition: Option<Repetition>,
@@ -41,13 +41,13 @@ pub(crate) struct Row {
     scene: [Hash; 2],
     /// Numbers of the actions' IRIs.
     pub actions: Vec<Option<u32>>,
-    pub outcomes: Vec<RowOutcome>,
+    pub outcomes: Vec<EntryOutcome>,
     pub places: Places,
 }
 
 /// One outcome of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct RowOutcome {
+pub(crate) struct EntryOutcome {
     /// Position of the action, from 0.
     pub action: u32,
     /// Number of the property's IRI.
@@ -115,12 +115,12 @@ struct Evidence {
 
 /// The texts of a segment by their numbers.
 #[derive(Debug, Default)]
-pub(crate) struct Texts {
+pub(crate) struct TextTable {
     all: Vec<String>,
     numbers: HashMap<String, u32>,
 }
 
-impl Texts {
+impl TextTable {
     fn number(&mut self, text: &str) -> u32 {
         if let Some(number) = self.numbers.get(text) {
             return *number;
@@ -156,7 +156,7 @@ impl Texts {
 pub(crate) fn encode_row(
     stored: &StoredRun,
     places: Places,
-    texts: &mut Texts,
+    texts: &mut TextTable,
 ) -> postcard::Result<Vec<u8>> {
     let known = texts.len();
     let digest = stored.scene_digest();
@@ -165,14 +165,14 @@ pub(crate) fn encode_row(
     let actions = actions.collect();
     let mut outcomes = Vec::new();
     for (step, action) in (0..).zip(&stored.actions) {
-        outcomes.extend(action.judgements.iter().map(|judgement| RowOutcome {
+        outcomes.extend(action.judgements.iter().map(|judgement| EntryOutcome {
             action: step,
             property: texts.number(&judgement.property),
             outcome: judgement.outcome,
             margin: judgement.margin,
         }));
     }
-    let row = Row {
+    let row = RunEntry {
         index: stored.index,
         repetition: stored.repetition,
         weight: stored.weight,
@@ -196,15 +196,15 @@ pub(crate) fn encode_row(
 ///
 /// # Errors
 /// The content is none of this program.
-pub(crate) fn decode_row(content: &[u8], texts: &mut Texts) -> postcard::Result<Row> {
-    let (new, row): (Vec<String>, Row) = postcard::from_bytes(content)?;
+pub(crate) fn decode_row(content: &[u8], texts: &mut TextTable) -> postcard::Result<RunEntry> {
+    let (new, row): (Vec<String>, RunEntry) = postcard::from_bytes(content)?;
     for text in &new {
         texts.number(text);
     }
     Ok(row)
 }
 
-impl Row {
+impl RunEntry {
     /// Digest over every state.
     pub(crate) fn trace_hash(&self) -> String {
         self.trace_hash.text()
@@ -256,7 +256,7 @@ pub(crate) fn encode_details(stored: &StoredRun) -> postcard::Result<Vec<u8>> {
 
 /// A run from both contents. Returns `None` if they don't belong together, or are none of this
 /// program.
-pub(crate) fn decode(row: &Row, details: &[u8], texts: &Texts) -> Option<StoredRun> {
+pub(crate) fn decode(row: &RunEntry, details: &[u8], texts: &TextTable) -> Option<StoredRun> {
     let details: Details = postcard::from_bytes(details).ok()?;
     if details.actions.len() != row.actions.len() {
         return None;

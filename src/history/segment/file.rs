@@ -6,9 +6,11 @@ use std::os::unix::fs::FileExt as _;
 use std::path::{Path, PathBuf};
 
 use crate::inflate::most_expanded;
-use crate::segment::encode::{Places, Row, Texts, decode, decode_row, encode_details, encode_row};
+use crate::segment::encode::{
+    Places, RunEntry, TextTable, decode, decode_row, encode_details, encode_row,
+};
 use crate::segment::frame::{
-    Column, FRAME_HEADER, FrameFault, Frames, HEAD, Place, ReadFault, content_of, put,
+    FRAME_HEADER, FrameFault, FramePlace, Frames, HEAD, ReadFault, SegmentColumn, content_of, put,
 };
 use crate::stored_run::StoredRun;
 use actcheck_base::{Below, ByteReader, put_varint};
@@ -16,9 +18,9 @@ use actcheck_base::{Below, ByteReader, put_varint};
 /// Compression level: higher ones take many times as long and save some percent.
 const LEVEL: i32 = 6;
 
-/// What is stored of a run.
+/// The parts of a run.
 #[derive(Debug)]
-pub(crate) struct Content<'a> {
+pub(crate) struct RunContent<'a> {
     pub run: &'a StoredRun,
     /// Its choices and states, encoded.
     pub states: &'a [u8],
@@ -27,22 +29,22 @@ pub(crate) struct Content<'a> {
 }
 
 /// Path of a column of a segment.
-fn path(folder: &Path, number: u32, column: Column) -> PathBuf {
+fn path(folder: &Path, number: u32, column: SegmentColumn) -> PathBuf {
     folder.join(format!("{number:04}.{}", column.extension()))
 }
 
 /// A column that one process writes.
 #[derive(Debug)]
-struct Written {
+struct ColumnWriter {
     file: File,
     end: u64,
-    /// Content of the first frame: the dictionary by which the others are compressed. Runs of a
+    /// RunContent of the first frame: the dictionary by which the others are compressed. Runs of a
     /// campaign are much alike.
     first: Option<Vec<u8>>,
 }
 
-impl Written {
-    fn create(below: &Below, path: &Path, column: Column) -> io::Result<Self> {
+impl ColumnWriter {
+    fn create(below: &Below, path: &Path, column: SegmentColumn) -> io::Result<Self> {
         let mut file = below.append(path)?;
         if file.metadata()?.len() > 0 {
             return Err(io::Error::new(
@@ -59,7 +61,7 @@ impl Written {
     }
 
     /// Appends a frame, completely or not at all.
-    fn append(&mut self, content: &[u8]) -> io::Result<Place> {
+    fn append(&mut self, content: &[u8]) -> io::Result<FramePlace> {
         let mut bytes = Vec::with_capacity(FRAME_HEADER + content.len());
         let place = put(self.end, content, &mut bytes)?;
         if let Err(error) = self.file.write_all(&bytes) {
@@ -71,7 +73,7 @@ impl Written {
     }
 
     /// Appends a frame that is compressed by the first one.
-    fn append_alike(&mut self, content: &[u8]) -> io::Result<Place> {
+    fn append_alike(&mut self, content: &[u8]) -> io::Result<FramePlace> {
         let dictionary = self.first.as_deref().unwrap_or_default();
         let mut compressed = Vec::new();
         put_varint(&mut compressed, content.len() as u64);
@@ -84,7 +86,7 @@ impl Written {
         Ok(place)
     }
 
-    /// Removes what a run that was not written completely has left.
+    /// Removes the frames of a run that was not written completely.
     fn cut(&mut self, end: u64) -> io::Result<()> {
         self.file.set_len(end)?;
         self.end = end;
@@ -98,11 +100,11 @@ pub(crate) struct SegmentWriter {
     below: Below,
     folder: PathBuf,
     number: u32,
-    runs: Written,
-    details: Written,
-    states: Written,
-    motion: Option<Written>,
-    texts: Texts,
+    runs: ColumnWriter,
+    details: ColumnWriter,
+    states: ColumnWriter,
+    motion: Option<ColumnWriter>,
+    texts: TextTable,
 }
 
 impl SegmentWriter {
@@ -111,13 +113,13 @@ impl SegmentWriter {
     /// # Errors
     /// The number is taken; the files can't be created.
     pub(crate) fn create(below: &Below, folder: &Path, number: u32) -> io::Result<Self> {
-        let new = |column| Written::create(below, &path(folder, number, column), column);
+        let new = |column| ColumnWriter::create(below, &path(folder, number, column), column);
         Ok(Self {
-            runs: new(Column::Runs)?,
-            details: new(Column::Details)?,
-            states: new(Column::States)?,
+            runs: new(SegmentColumn::Runs)?,
+            details: new(SegmentColumn::Details)?,
+            states: new(SegmentColumn::States)?,
             motion: None,
-            texts: Texts::default(),
+            texts: TextTable::default(),
             below: below.clone(),
             folder: folder.to_path_buf(),
             number,
@@ -128,7 +130,7 @@ impl SegmentWriter {
     ///
     /// # Errors
     /// Writing failed.
-    pub(crate) fn append(&mut self, content: &Content<'_>) -> io::Result<()> {
+    pub(crate) fn append(&mut self, content: &RunContent<'_>) -> io::Result<()> {
         let ends = [self.details.end, self.states.end];
         let motion_end = self.motion.as_ref().map(|motion| motion.end);
         let (texts, firsts) = (
@@ -149,7 +151,7 @@ impl SegmentWriter {
         })
     }
 
-    fn append_columns(&mut self, content: &Content<'_>) -> io::Result<()> {
+    fn append_columns(&mut self, content: &RunContent<'_>) -> io::Result<()> {
         let fault = |error: postcard::Error| io::Error::other(error.to_string());
         let motion = match content.motion {
             Some(bytes) => Some(self.motion()?.append(bytes)?),
@@ -166,13 +168,13 @@ impl SegmentWriter {
         self.runs.append(&row).map(|_| ())
     }
 
-    fn motion(&mut self) -> io::Result<&mut Written> {
+    fn motion(&mut self) -> io::Result<&mut ColumnWriter> {
         let motion = match self.motion.take() {
             Some(motion) => motion,
-            None => Written::create(
+            None => ColumnWriter::create(
                 &self.below,
-                &path(&self.folder, self.number, Column::Motion),
-                Column::Motion,
+                &path(&self.folder, self.number, SegmentColumn::Motion),
+                SegmentColumn::Motion,
             )?,
         };
         Ok(self.motion.insert(motion))
@@ -197,8 +199,8 @@ pub(crate) struct Segment {
     folder: PathBuf,
     number: u32,
     below: Below,
-    texts: Texts,
-    rows: Vec<Row>,
+    texts: TextTable,
+    rows: Vec<RunEntry>,
     is_torn: bool,
 }
 
@@ -208,9 +210,9 @@ impl Segment {
     /// # Errors
     /// Its column of runs is damaged or can't be read.
     pub(crate) fn open(below: &Below, folder: &Path, number: u32) -> Result<Self, ReadFault> {
-        let file = below.open(&path(folder, number, Column::Runs))?;
-        let mut frames = Frames::new(Column::Runs, BufReader::new(file))?;
-        let (mut texts, mut rows, mut content) = (Texts::default(), Vec::new(), Vec::new());
+        let file = below.open(&path(folder, number, SegmentColumn::Runs))?;
+        let mut frames = Frames::new(SegmentColumn::Runs, BufReader::new(file))?;
+        let (mut texts, mut rows, mut content) = (TextTable::default(), Vec::new(), Vec::new());
         while let Some(place) = frames.next(&mut content)? {
             let row = decode_row(&content, &mut texts);
             rows.push(row.map_err(|_| FrameFault::Content(place.offset))?);
@@ -226,12 +228,12 @@ impl Segment {
     }
 
     /// The runs in the order in which they were stored.
-    pub(crate) fn rows(&self) -> &[Row] {
+    pub(crate) fn rows(&self) -> &[RunEntry] {
         &self.rows
     }
 
     /// The texts that rows give by number.
-    pub(crate) fn texts(&self) -> &Texts {
+    pub(crate) fn texts(&self) -> &TextTable {
         &self.texts
     }
 
@@ -244,9 +246,9 @@ impl Segment {
     ///
     /// # Errors
     /// The run is damaged or can't be read.
-    pub(crate) fn run(&self, row: &Row) -> Result<StoredRun, ReadFault> {
+    pub(crate) fn run(&self, row: &RunEntry) -> Result<StoredRun, ReadFault> {
         let place = row.places.details;
-        let details = self.read_alike(Column::Details, place)?;
+        let details = self.read_alike(SegmentColumn::Details, place)?;
         let run = decode(row, &details, &self.texts);
         run.ok_or_else(|| FrameFault::Content(place.offset).into())
     }
@@ -255,34 +257,34 @@ impl Segment {
     ///
     /// # Errors
     /// They are damaged or can't be read.
-    pub(crate) fn states(&self, row: &Row) -> Result<Vec<u8>, ReadFault> {
-        self.read_alike(Column::States, row.places.states)
+    pub(crate) fn states(&self, row: &RunEntry) -> Result<Vec<u8>, ReadFault> {
+        self.read_alike(SegmentColumn::States, row.places.states)
     }
 
     /// The encoded motion of a run; `None` if it is not kept.
     ///
     /// # Errors
     /// It is damaged or can't be read.
-    pub(crate) fn motion(&self, row: &Row) -> Result<Option<Vec<u8>>, ReadFault> {
+    pub(crate) fn motion(&self, row: &RunEntry) -> Result<Option<Vec<u8>>, ReadFault> {
         row.places
             .motion
             .map(|place| {
-                let file = self
-                    .below
-                    .open(&path(&self.folder, self.number, Column::Motion))?;
+                let file =
+                    self.below
+                        .open(&path(&self.folder, self.number, SegmentColumn::Motion))?;
                 read_at(&file, place)
             })
             .transpose()
     }
 
     /// Reads a frame that is compressed by the first one of its column.
-    fn read_alike(&self, column: Column, place: Place) -> Result<Vec<u8>, ReadFault> {
+    fn read_alike(&self, column: SegmentColumn, place: FramePlace) -> Result<Vec<u8>, ReadFault> {
         let file = self.below.open(&path(&self.folder, self.number, column))?;
         let dictionary = if place.offset == HEAD as u64 {
             Vec::new()
         } else {
             let first = match column {
-                Column::States => self.rows.first().map(|row| row.places.states),
+                SegmentColumn::States => self.rows.first().map(|row| row.places.states),
                 _ => self.rows.first().map(|row| row.places.details),
             };
             let first = first.ok_or(FrameFault::Missing(HEAD as u64))?;
@@ -293,7 +295,7 @@ impl Segment {
 }
 
 /// Reads the content of the frame at a place.
-fn read_at(file: &File, place: Place) -> Result<Vec<u8>, ReadFault> {
+fn read_at(file: &File, place: FramePlace) -> Result<Vec<u8>, ReadFault> {
     // Damage to the row is found by its checksum; a file that was cut has no such frame.
     if file.metadata()?.len() < place.end() {
         return Err(FrameFault::Missing(place.offset).into());
@@ -306,7 +308,7 @@ fn read_at(file: &File, place: Place) -> Result<Vec<u8>, ReadFault> {
 }
 
 /// Decompresses the content of the frame at a place.
-fn expanded(bytes: &[u8], dictionary: &[u8], place: Place) -> Result<Vec<u8>, ReadFault> {
+fn expanded(bytes: &[u8], dictionary: &[u8], place: FramePlace) -> Result<Vec<u8>, ReadFault> {
     let fault = || FrameFault::Content(place.offset);
     let mut reader = ByteReader { bytes };
     let size = reader.varint().ok_or_else(fault)?;
@@ -348,7 +350,7 @@ mod tests {
         for index in 0..count {
             let (run, states) = (sample(index), states(index));
             let motion = (index % 2 == 0).then(|| vec![index as u8; 100]);
-            let content = Content {
+            let content = RunContent {
                 run: &run,
                 states: &states,
                 motion: motion.as_deref(),
@@ -391,7 +393,12 @@ mod tests {
             let file = path(folder.path(), 1, column);
             file.metadata().expect("it is there").len() / 40
         };
-        let sizes = [Column::Runs, Column::Details, Column::States].map(size);
+        let sizes = [
+            SegmentColumn::Runs,
+            SegmentColumn::Details,
+            SegmentColumn::States,
+        ]
+        .map(size);
         assert!(sizes.iter().sum::<u64>() < 1_500, "{sizes:?} bytes a run");
     }
 
@@ -399,7 +406,7 @@ mod tests {
     #[test]
     fn flipped_bits_are_found() {
         let (folder, below) = written(4);
-        for column in Column::ALL {
+        for column in SegmentColumn::ALL {
             let file = path(folder.path(), 1, column);
             let whole = std::fs::read(&file).expect("it is there");
             for at in (0..whole.len()).step_by(1 + whole.len() / 150) {
@@ -408,7 +415,7 @@ mod tests {
                 std::fs::write(&file, damaged).expect("it can be written");
                 let found = checked(folder.path(), &below);
                 // The first bytes of columns whose frames are found by their place are not read.
-                let is_head = column != Column::Runs && at < HEAD;
+                let is_head = column != SegmentColumn::Runs && at < HEAD;
                 assert!(found.is_err() || is_head, "byte {at} of {}", file.display());
             }
             std::fs::write(&file, whole).expect("it can be written");
@@ -419,11 +426,11 @@ mod tests {
     #[test]
     fn the_runs_before_a_kill_are_whole() {
         let (folder, below) = written(4);
-        let file = path(folder.path(), 1, Column::Runs);
+        let file = path(folder.path(), 1, SegmentColumn::Runs);
         let whole = std::fs::read(&file).expect("it is there");
         for length in 0..whole.len() {
             std::fs::write(&file, &whole[..length]).expect("it can be written");
-            let found = checked(folder.path(), &below).expect("a cut is no damage");
+            let found = checked(folder.path(), &below).expect("it is only cut");
             assert!(found < 4);
             let segment = Segment::open(&below, folder.path(), 1).expect("it can be read");
             assert!(segment.is_torn() || found < 4);

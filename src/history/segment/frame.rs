@@ -15,12 +15,12 @@ pub(crate) const HEAD: usize = 8;
 pub(crate) const FRAME_HEADER: usize = 12;
 /// Largest content of a frame. Unit: bytes.
 const MOST_CONTENT: u32 = 1 << 30;
-/// Format of all columns: it increases with every change of what is stored.
+/// Format of all columns: it increases with every change of the stored values.
 const FORMAT: u8 = b'1';
 
-/// What the files of a column hold.
+/// The kinds of values in a segment, each in a file of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Column {
+pub(crate) enum SegmentColumn {
     /// The values of runs in lists, and where the rest of each run is.
     Runs,
     /// The other values of runs.
@@ -31,9 +31,9 @@ pub(crate) enum Column {
     Motion,
 }
 
-impl Column {
-    /// All columns, in the order in which a run is written: the frame in [`Column::Runs`] says that
-    /// it is complete.
+impl SegmentColumn {
+    /// All columns, in the order in which a run is written: the frame in [`SegmentColumn::Runs`]
+    /// says that it is complete.
     pub(crate) const ALL: [Self; 4] = [Self::Motion, Self::States, Self::Details, Self::Runs];
 
     /// Extension of its files.
@@ -58,10 +58,9 @@ impl Column {
     }
 }
 
-/// Where a frame is, and the checksum of its content: whoever refers to a frame notices another one
-/// in its place.
+/// Where a frame is, and the checksum of its content, which shows another frame in its place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub(crate) struct Place {
+pub(crate) struct FramePlace {
     /// Offset of its header in the file. Unit: bytes.
     pub offset: u64,
     /// Size of its content. Unit: bytes.
@@ -70,7 +69,7 @@ pub(crate) struct Place {
     pub sum: u32,
 }
 
-impl Place {
+impl FramePlace {
     /// Offset of the first byte after the frame.
     pub(crate) fn end(self) -> u64 {
         self.offset + FRAME_HEADER as u64 + u64::from(self.size)
@@ -109,12 +108,12 @@ pub(crate) enum ReadFault {
 ///
 /// # Errors
 /// The content is too large.
-pub(crate) fn put(offset: u64, content: &[u8], out: &mut Vec<u8>) -> io::Result<Place> {
+pub(crate) fn put(offset: u64, content: &[u8], out: &mut Vec<u8>) -> io::Result<FramePlace> {
     let size = u32::try_from(content.len())
         .ok()
         .filter(|size| *size <= MOST_CONTENT)
         .ok_or_else(|| io::Error::other("a run has more than 1 GiB of one kind"))?;
-    let place = Place {
+    let place = FramePlace {
         offset,
         size,
         sum: sum(&[content]),
@@ -132,7 +131,7 @@ fn sum(parts: &[&[u8]]) -> u32 {
     crc.sum()
 }
 
-fn header_sum(place: Place) -> u32 {
+fn header_sum(place: FramePlace) -> u32 {
     let (offset, size, content) = (
         place.offset.to_le_bytes(),
         place.size.to_le_bytes(),
@@ -142,9 +141,9 @@ fn header_sum(place: Place) -> u32 {
 }
 
 /// Parses a header at `offset`.
-fn header(offset: u64, bytes: [u8; FRAME_HEADER]) -> Result<Place, FrameFault> {
+fn header(offset: u64, bytes: [u8; FRAME_HEADER]) -> Result<FramePlace, FrameFault> {
     let [a, b, c, d, e, f, g, h, i, j, k, l] = bytes;
-    let place = Place {
+    let place = FramePlace {
         offset,
         size: u32::from_le_bytes([a, b, c, d]),
         sum: u32::from_le_bytes([e, f, g, h]),
@@ -171,7 +170,7 @@ impl<R: Read> Frames<R> {
     ///
     /// # Errors
     /// It is a file of another kind; the system can't read it.
-    pub(crate) fn new(column: Column, mut source: R) -> Result<Self, ReadFault> {
+    pub(crate) fn new(column: SegmentColumn, mut source: R) -> Result<Self, ReadFault> {
         let mut head = [0; HEAD];
         let read = fill(&mut source, &mut head)?;
         if !column.head().starts_with(&head[..read]) {
@@ -188,7 +187,7 @@ impl<R: Read> Frames<R> {
     ///
     /// # Errors
     /// The frame is damaged; the system can't read it.
-    pub(crate) fn next(&mut self, content: &mut Vec<u8>) -> Result<Option<Place>, ReadFault> {
+    pub(crate) fn next(&mut self, content: &mut Vec<u8>) -> Result<Option<FramePlace>, ReadFault> {
         content.clear();
         if self.is_torn {
             return Ok(None);
@@ -201,7 +200,7 @@ impl<R: Read> Frames<R> {
         }
         let place = header(self.offset, bytes)?;
         let size = u64::from(place.size);
-        // The memory grows with what is read, not with the size that the header claims.
+        // The memory grows with the bytes that are read, not with the size that the header claims.
         self.source.by_ref().take(size).read_to_end(content)?;
         if (content.len() as u64) < size {
             self.is_torn = true;
@@ -239,7 +238,7 @@ fn fill(source: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
 ///
 /// # Errors
 /// The bytes are those of another frame, damaged, or cut.
-pub(crate) fn content_of(place: Place, bytes: &[u8]) -> Result<&[u8], FrameFault> {
+pub(crate) fn content_of(place: FramePlace, bytes: &[u8]) -> Result<&[u8], FrameFault> {
     let (head, rest) = bytes
         .split_first_chunk::<FRAME_HEADER>()
         .ok_or(FrameFault::Missing(place.offset))?;
@@ -261,8 +260,8 @@ mod tests {
     use super::*;
 
     /// A file with three frames, and their places.
-    fn file() -> (Vec<u8>, Vec<Place>) {
-        let mut bytes = Column::Runs.head().to_vec();
+    fn file() -> (Vec<u8>, Vec<FramePlace>) {
+        let mut bytes = SegmentColumn::Runs.head().to_vec();
         let mut places = Vec::new();
         for content in [&b"first"[..], b"", b"the third"] {
             let offset = bytes.len() as u64;
@@ -273,7 +272,7 @@ mod tests {
 
     /// The frames of a file, or its fault; and whether its tail is torn.
     fn read(bytes: &[u8]) -> Result<(Vec<Vec<u8>>, bool), ReadFault> {
-        let mut frames = Frames::new(Column::Runs, bytes)?;
+        let mut frames = Frames::new(SegmentColumn::Runs, bytes)?;
         let (mut found, mut content) = (Vec::new(), Vec::new());
         while frames.next(&mut content)?.is_some() {
             found.push(content.clone());
@@ -311,7 +310,7 @@ mod tests {
         let (bytes, places) = file();
         let ends: Vec<u64> = places.iter().map(|place| place.end()).collect();
         for length in 0..=bytes.len() {
-            let (found, is_torn) = read(&bytes[..length]).expect("cut files are no damage");
+            let (found, is_torn) = read(&bytes[..length]).expect("it is only cut");
             let whole = ends.iter().filter(|end| **end <= length as u64).count();
             let is_border = length == HEAD || ends.contains(&(length as u64));
             assert_eq!(
@@ -328,12 +327,12 @@ mod tests {
         let [first, second, third] = places[..] else {
             panic!("three frames");
         };
-        let at = |place: Place| &bytes[place.offset as usize..];
+        let at = |place: FramePlace| &bytes[place.offset as usize..];
         assert_eq!(
             content_of(first, at(third)),
             Err(FrameFault::Header(first.offset))
         );
-        let moved = Place {
+        let moved = FramePlace {
             offset: second.offset,
             ..third
         };
@@ -354,16 +353,17 @@ mod tests {
     #[test]
     fn files_of_other_columns_and_formats_are_refused() {
         let (bytes, _) = file();
-        let heads = Column::ALL.map(Column::head);
+        let heads = SegmentColumn::ALL.map(SegmentColumn::head);
         assert!((1..heads.len()).all(|n| !heads[..n].contains(&heads[n])));
-        let fault = Frames::new(Column::Details, bytes.as_slice()).expect_err("it holds runs");
+        let fault =
+            Frames::new(SegmentColumn::Details, bytes.as_slice()).expect_err("it holds runs");
         assert!(matches!(fault, ReadFault::Damaged(FrameFault::Head)));
     }
 
     #[test]
     fn a_large_size_takes_no_memory() {
-        let mut bytes = Column::Runs.head().to_vec();
-        let place = Place {
+        let mut bytes = SegmentColumn::Runs.head().to_vec();
+        let place = FramePlace {
             offset: HEAD as u64,
             size: MOST_CONTENT,
             sum: 0,
@@ -371,7 +371,8 @@ mod tests {
         bytes.extend(place.size.to_le_bytes());
         bytes.extend(place.sum.to_le_bytes());
         bytes.extend(header_sum(place).to_le_bytes());
-        let mut frames = Frames::new(Column::Runs, bytes.as_slice()).expect("its head is right");
+        let mut frames =
+            Frames::new(SegmentColumn::Runs, bytes.as_slice()).expect("its head is right");
         let mut content = Vec::new();
         assert!(frames.next(&mut content).expect("it is cut").is_none());
         assert!(content.capacity() < 4096 && frames.tail().1);

@@ -79,8 +79,8 @@ impl<'a> SolidPair<'a> {
         self.separation_near(start, far_m, &mut Vec::new())
     }
 
-    /// As [`SolidPair::separation`]. The search begins with these points of both solids, each in the
-    /// frame of its solid, if there are any, and leaves those with which it ended; none if they
+    /// As [`SolidPair::separation`]. The search begins with these points of both solids, each in
+    /// the frame of its solid, if there are any, and leaves those with which it ended; none if they
     /// overlap.
     pub(crate) fn separation_near(
         &self,
