@@ -255,6 +255,6 @@ fn held(world: &World) -> Option<(String, Point3<f64>, Isometry3<f64>)> {
         .find(|body| body.id == *id && !body.fixed)?;
     let of = |pose: &Pose| pose.to_isometry();
     let in_hand = of(&now.robot.gripper).inverse() * of(&body.pose);
-    let height = body.size_m.map_or(0.0, |[_, _, height]| height);
+    let [_, _, height] = body.size_m;
     Some((id.clone(), Point3::new(0.0, 0.0, height / 2.0), in_hand))
 }

@@ -174,7 +174,7 @@ pub(crate) fn checked(
     }
     let mesh = Mesh::new(vertices, triangles).map_err(MeshFileFault::Mesh)?;
     let welded = mesh.welded();
-    Mesh::new(welded.vertices, welded.triangles).map_err(invalid)
+    Mesh::new(welded.vertices, welded.triangles).map_err(MeshFileFault::Mesh)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::segment::frame::Place;
+use crate::segment::frame::FramePlace;
 use crate::stored_run::{StoredAction, StoredRun, StoredScene};
 use crate::{Repetition, RunStatus, SceneDigest};
 use actcheck_base::{Judgement, Outcome};
