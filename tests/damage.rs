@@ -181,7 +181,7 @@ const ASKED: [&[&str]; 6] = [
 
 /// The answers; that of an export is its table. `show` is also asked for a run with a trace of a
 /// simulation.
-fn asked_anew(folder: &Path, first: &str) -> Vec<(Option<i32>, String, String)> {
+fn asked_anew(folder: &Path, first: &str, damage: &str) -> Vec<(Option<i32>, String, String)> {
     let _ = std::fs::remove_dir_all(folder.join("out"));
     let show = ["show", first, "--format", "json", "--history", "h"];
     let all = ASKED.into_iter().chain([&show[..]]);
@@ -190,8 +190,8 @@ fn asked_anew(folder: &Path, first: &str) -> Vec<(Option<i32>, String, String)> 
             if number == 2 {
                 let _ = std::fs::remove_dir_all(folder.join("h/tables"));
             }
-            let mut answer =
-                asked(folder, question).unwrap_or_else(|| panic!("{question:?} does not end"));
+            let mut answer = asked(folder, question)
+                .unwrap_or_else(|| panic!("{damage}: {question:?} does not end"));
             if question.contains(&"--csv") {
                 let table =
                     std::fs::read_to_string(folder.join("out/outcomes.csv")).unwrap_or_default();
@@ -241,7 +241,7 @@ fn numbers_made_anew_from_damaged_files_are_the_same_or_refused() {
     let first = runs.find(|run| !run.starts_with("k-")).unwrap();
     let keep = tempfile::tempdir().unwrap();
     copy(&whole.path().join("h"), &keep.path().join("h"));
-    let right = asked_anew(whole.path(), &first);
+    let right = asked_anew(whole.path(), &first, "no damage");
     assert!(right.iter().all(|(code, ..)| *code == Some(0)), "{right:?}");
     let relative = |file: PathBuf| file.strip_prefix(keep.path()).unwrap().to_path_buf();
     let all: Vec<PathBuf> = files(&keep.path().join("h"))
@@ -286,7 +286,7 @@ fn numbers_made_anew_from_damaged_files_are_the_same_or_refused() {
             format!("{} cut to {length} bytes", file.display())
         };
         let mut is_noticed = false;
-        for (idx, (answer, right)) in asked_anew(folder.path(), &first)
+        for (idx, (answer, right)) in asked_anew(folder.path(), &first, &damage)
             .into_iter()
             .zip(&right)
             .enumerate()

@@ -358,7 +358,12 @@ fn metadata(more: &[&str]) -> Result<Value, String> {
         .map_err(|error| error.to_string())?;
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     serde_json::from_slice(&output.stdout)
-        .map_err(|_| said.lines().next().unwrap_or_default().to_owned())
+        // Before its error, cargo says that it waits for the locks of another one.
+        .map_err(|_| {
+            let mut lines = said.lines();
+            let reason = lines.find(|line| !line.trim_start().starts_with("Blocking"));
+            reason.unwrap_or_default().to_owned()
+        })
 }
 
 #[test]

@@ -408,6 +408,7 @@ fn files_in_output_folders_are_not_written_through_links() {
     for name in [
         "out/outcomes.csv",
         "out/schema.json",
+        "out.schema.json",
         "out/actcheck.1",
         "out/outcomes.parquet",
         "out/actions.parquet",

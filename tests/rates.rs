@@ -203,7 +203,7 @@ fn exported_rows_say_whether_their_run_counts() {
         "five properties of three runs, twice, and no regression"
     );
     let schema: Value =
-        serde_json::from_str(&std::fs::read_to_string(folder.join("tables/schema.json")).unwrap())
+        serde_json::from_str(&std::fs::read_to_string(folder.join("tables.schema.json")).unwrap())
             .unwrap();
     assert!(
         schema["columns"]

@@ -2,9 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::process::Command;
 
 use serde_json::Value;
 
+use crate::support::foreign::python;
 use crate::support::{actcheck, edit, project, root, stderr, stdout};
 
 fn csv(file: &Path) -> Vec<BTreeMap<String, String>> {
@@ -70,14 +72,12 @@ fn tables_agree_with_the_history(here: &Path) {
         let output = actcheck(here, &[&["export", "tables", "t"], format].concat());
         assert!(output.status.success(), "{}", stderr(&output));
     }
-    assert_eq!(
-        files(&here.join("t")),
-        ["outcomes.csv", "outcomes.parquet", "schema.json"]
-    );
+    assert_eq!(files(&here.join("t")), ["outcomes.csv", "outcomes.parquet"]);
+    a_folder_is_one_table(here);
     let rows = csv(&here.join("t/outcomes.csv"));
     assert_eq!(rows.len(), 6 * 5, "five properties of six runs");
     let schema: Value =
-        serde_json::from_str(&std::fs::read_to_string(here.join("t/schema.json")).unwrap())
+        serde_json::from_str(&std::fs::read_to_string(here.join("t.schema.json")).unwrap())
             .unwrap();
     let described: Vec<&str> = schema["columns"]
         .as_array()
@@ -152,6 +152,25 @@ fn tables_agree_with_the_history(here: &Path) {
             .count()
     };
     assert_eq!(outcomes("#MovedObject"), 6);
+}
+
+/// Readers take each file of a folder for a part of one table.
+fn a_folder_is_one_table(here: &Path) {
+    let output = actcheck(here, &["export", "tables", "one"]);
+    assert!(output.status.success(), "{}", stderr(&output));
+    assert_eq!(files(&here.join("one")), ["outcomes.parquet"]);
+    let Some(python) = python() else {
+        return;
+    };
+    let read = Command::new(python)
+        .args([
+            "-c",
+            "import polars; print(polars.read_parquet('one').height)",
+        ])
+        .current_dir(here)
+        .output()
+        .unwrap();
+    assert_eq!(stdout(&read), "30\n", "{}", stderr(&read));
 }
 
 fn a_damaged_mirror_is_rebuilt(here: &Path, history: &Path) {

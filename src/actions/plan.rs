@@ -65,7 +65,7 @@ const LEVEL: f64 = 0.3;
 const ASIDE_RAD: f64 = 0.5;
 /// Postures sampled if the arm can't unfold straight to any grasp.
 const MOST_SAMPLES: u32 = 4000;
-/// Reason reported if there is no plan.
+/// Reason reported if no plan is found.
 pub(super) const NO_WAY: &str = "no reachable, collision-free path to it was found";
 
 /// The planner's task.
@@ -88,7 +88,7 @@ pub struct PlanRequest<'a> {
 /// many slants, and last those turned relative to the base. For a fixed base, see [`standing`].
 ///
 /// # Errors
-/// [`NoPlan`] if there is no plan.
+/// [`NoPlan`] if none is found.
 pub fn plan(
     operator: &mut Operator<'_>,
     wanted: PlanRequest<'_>,

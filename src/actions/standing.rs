@@ -61,7 +61,7 @@ const RETREATS_M: [f64; 2] = [0.1, 0.05];
 /// then among hands at many slants.
 ///
 /// # Errors
-/// [`NoPlan`] if there is no plan.
+/// [`NoPlan`] if none is found.
 pub fn plan(
     operator: &mut Operator<'_>,
     wanted: PlanRequest<'_>,

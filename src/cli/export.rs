@@ -32,10 +32,10 @@ pub enum ExportKind {
     /// The outcomes, facts or motion of runs as tables, with a description of their columns
     ///
     /// Writes the table of outcomes, one row for each run, action and property with the scene's
-    /// parameters, the errors drawn and the effects: `outcomes.parquet`, and `schema.json`, which
-    /// describes the columns. It contains no shrunk runs, no cases, and no runs of
-    /// `run --last-failed`. Its column `counts` is false for runs that are bit-identical to a later
-    /// one.
+    /// parameters, the errors drawn and the effects: `outcomes.parquet`. `DIR.schema.json`, beside
+    /// the folder, describes its columns; a folder with more tables has a `schema.json` of its own.
+    /// The table contains no shrunk runs, no cases, and no runs of `run --last-failed`. Its column
+    /// `counts` is false for runs that are bit-identical to a later one.
     #[command(
         after_help = "Examples:\n  actcheck export tables columns    (after `actcheck run configs/pick.toml`)\n  actcheck export tables sheets --csv\n  actcheck export tables learn_from --dataset"
     )]

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::options::HistoryArgs;
-use crate::{history_dir, output, restore};
+use crate::{history_dir, output};
 use actcheck_base::{Diagnostic, Diagnostics};
 
 /// `actcheck export rdf`
@@ -32,7 +32,6 @@ pub fn rdf(args: &ExportRdfArgs) -> Result<(), Diagnostics> {
         _ => return Err(other_format(args)),
     };
     let history = history_dir::open_to_read(&args.history)?;
-    restore::allow(&history, false);
     let contents = if is_turtle {
         history.write_turtle(file)?;
         "campaigns, runs, scenes and outcomes"

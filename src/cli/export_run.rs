@@ -6,7 +6,7 @@ use clap::{ArgGroup, Args};
 
 use crate::options::HistoryArgs;
 use crate::trust::TrustArgs;
-use crate::{history_dir, output, output_file, restore, trust};
+use crate::{history_dir, output, output_file, trust};
 use actcheck_base::{Diagnostic, Diagnostics, ShellLine};
 use actcheck_campaign as campaign;
 use actcheck_campaign::Env;
@@ -38,7 +38,6 @@ pub struct ExportRunArgs {
 /// Writes a stored run as a configuration.
 pub fn run(args: &ExportRunArgs) -> Result<(), Diagnostics> {
     let history = history_dir::open_to_read(&args.history)?;
-    restore::allow(&history, args.trust.trust);
     let run = history.run(&args.run)?;
     if args.config.is_none() && !args.trust.trust {
         trust::check_expansion(

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::options::HistoryArgs;
-use crate::{history_dir, output, remote, restore, stop};
+use crate::{history_dir, output, remote, stop};
 use actcheck_base::{Diagnostics, digest_of};
 use actcheck_history::History;
 use actcheck_remote::{Address, Part, Protocol, Sent, Upload, UploadOptions};
@@ -53,7 +53,6 @@ pub enum ProtocolName {
 pub fn store(args: &ExportStoreArgs) -> Result<u8, Diagnostics> {
     let address = Address::parse(&args.url)?;
     let history = history_dir::open_to_read(&args.history)?;
-    restore::allow(&history, false);
     stop::interruptible(|flag| {
         let client = remote::client(flag)?;
         let (upload, warning) = Upload::new(

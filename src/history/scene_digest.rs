@@ -70,33 +70,47 @@ impl History {
 /// The store can't be read.
 pub(super) fn read(store: &impl QuadSource, run: &NamedNode) -> Result<SceneDigest, StorageError> {
     let node = Node::read(store, run)?;
-    let objects = objects(store, run)?;
-    let mut arrangement = Digest::new();
-    for property in [
+    let whole = [
         "act:test",
         "act:worldName",
         "w:baseX",
         "w:baseY",
         "w:baseYaw",
-    ] {
-        arrangement.update(node.text(property).unwrap_or_default().as_bytes());
+    ]
+    .map(|property| node.text(property).unwrap_or_default());
+    let objects = objects(store, run)?;
+    Ok(SceneDigest::of(&whole, &designators(&node), &objects))
+}
+
+impl SceneDigest {
+    /// The digests of a scene. `whole`: the texts of the test, the world, and the base's pose;
+    /// `objects` and the values of each designator are sorted.
+    pub(super) fn of(
+        whole: &[String; 5],
+        designators: &BTreeMap<String, Vec<String>>,
+        objects: &[ObjectDetail],
+    ) -> Self {
+        let mut arrangement = Digest::new();
+        for text in whole {
+            arrangement.update(text.as_bytes());
+        }
+        for (designator, values) in designators {
+            arrangement.update(designator.as_bytes());
+            arrangement.update(values.join("\n").as_bytes());
+        }
+        let mut physics = Digest::new();
+        for object in objects {
+            add_place(object, &mut arrangement);
+            add_numbers(
+                [object.mass_kg, object.friction, object.restitution],
+                &mut physics,
+            );
+        }
+        Self {
+            arrangement: arrangement.finish(),
+            physics: physics.finish(),
+        }
     }
-    for (designator, values) in designators(&node) {
-        arrangement.update(designator.as_bytes());
-        arrangement.update(values.join("\n").as_bytes());
-    }
-    let mut physics = Digest::new();
-    for object in &objects {
-        add_place(object, &mut arrangement);
-        add_numbers(
-            [object.mass_kg, object.friction, object.restitution],
-            &mut physics,
-        );
-    }
-    Ok(SceneDigest {
-        arrangement: arrangement.finish(),
-        physics: physics.finish(),
-    })
 }
 
 fn add_place(object: &ObjectDetail, digest: &mut Digest) {

@@ -10,7 +10,7 @@ use crate::write_scene::noise;
 use crate::{ActionDetail, ObjectDetail, Repetition, RunRecord, RunStatus, SceneDigest};
 #[cfg(test)]
 use crate::{RunDetail, RunRow};
-use actcheck_base::{Digest, Judgement};
+use actcheck_base::Judgement;
 use actcheck_data::{ActionEnd, ActionTrace, Quality, Role, SceneObject};
 
 /// The values of one run. Its campaign's id is that of the place where it is stored.
@@ -145,37 +145,12 @@ impl StoredRun {
 
     /// Digests of its scene.
     pub(crate) fn scene_digest(&self) -> SceneDigest {
-        let mut arrangement = Digest::new();
-        arrangement.update(self.test.as_bytes());
-        arrangement.update(self.scene.world.as_bytes());
-        for value in self.scene.base {
-            arrangement.update(Literal::from(value).value().as_bytes());
-        }
-        for (designator, values) in &sorted(&self.scene.designators) {
-            arrangement.update(designator.as_bytes());
-            arrangement.update(values.join("\n").as_bytes());
-        }
-        let mut physics = Digest::new();
-        for object in &self.objects() {
-            for text in [
-                &object.id,
-                &object.model,
-                &object.category,
-                object.role.word(),
-            ] {
-                arrangement.update(text.as_bytes());
-            }
-            for value in [object.x, object.y, object.z, object.yaw] {
-                arrangement.update(&value.to_bits().to_le_bytes());
-            }
-            for value in [object.mass_kg, object.friction, object.restitution] {
-                physics.update(&value.to_bits().to_le_bytes());
-            }
-        }
-        SceneDigest {
-            arrangement: arrangement.finish(),
-            physics: physics.finish(),
-        }
+        let [x, y, yaw] = self
+            .scene
+            .base
+            .map(|value| Literal::from(value).value().to_owned());
+        let whole = [self.test.clone(), self.scene.world.clone(), x, y, yaw];
+        SceneDigest::of(&whole, &sorted(&self.scene.designators), &self.objects())
     }
 }
 

@@ -20,8 +20,8 @@ use actcheck_base::{Below, Diagnostics, NewFile};
 /// Column that says whether a run counts in rates over the exported rows.
 const COUNTS: &str = "counts";
 
-/// Writes `outcomes.parquet` and `schema.json` into a folder, creating it if needed. Returns the
-/// files and the number of rows.
+/// Writes `outcomes.parquet` into a folder, creating it if needed, and its description beside it:
+/// `FOLDER.schema.json`. Returns the files and the number of rows.
 ///
 /// # Errors
 /// `A001` if they can't be written, `A002` if the mirror can't be read.
@@ -31,11 +31,10 @@ pub fn export_parquet(
     hierarchy: &Hierarchy,
     folder: &Path,
 ) -> Result<(Vec<PathBuf>, usize), Diagnostics> {
-    written(pending_parquet(mirror, filter, hierarchy, folder)?)
+    written(pending_parquet(mirror, filter, hierarchy, folder)?, folder)
 }
 
-/// Writes `outcomes.parquet` and `schema.json` into a folder, creating it if needed, without giving
-/// them their names.
+/// Writes `outcomes.parquet` into a folder, creating it if needed, without giving it its name.
 pub(crate) fn pending_parquet(
     mirror: &Mirror,
     filter: &TableFilter,
@@ -57,8 +56,8 @@ pub(crate) fn pending_parquet(
     })
 }
 
-/// Writes `outcomes.csv` and `schema.json` into a folder, creating it if needed. Returns the files
-/// and the number of rows.
+/// Writes `outcomes.csv` into a folder, creating it if needed, and its description beside it, as
+/// [`export_parquet`]. Returns the files and the number of rows.
 ///
 /// # Errors
 /// As [`export_parquet`].
@@ -68,7 +67,7 @@ pub fn export_csv(
     hierarchy: &Hierarchy,
     folder: &Path,
 ) -> Result<(Vec<PathBuf>, usize), Diagnostics> {
-    written(export(folder, "outcomes.csv", |file, writer| {
+    let pending = export(folder, "outcomes.csv", |file, writer| {
         let schema = empty(hierarchy).map_err(|error| unwritten(file, &error))?;
         let mut writer = CsvWriter::new(writer)
             .batched(schema.schema())
@@ -80,13 +79,13 @@ pub fn export_csv(
         })?;
         writer.finish().map_err(|error| unwritten(file, &error))?;
         Ok(rows)
-    })?)
+    })?;
+    written(pending, folder)
 }
 
-/// A table and its description, complete but without their names.
+/// A table that is complete but has no name yet.
 pub(crate) struct Pending {
     table: (PathBuf, NewFile),
-    described: (PathBuf, NewFile),
     rows: usize,
 }
 
@@ -99,13 +98,40 @@ impl Pending {
     }
 }
 
-fn written(pending: Pending) -> Result<(Vec<PathBuf>, usize), Diagnostics> {
-    let mut paths = Vec::new();
-    for (path, file) in [pending.table, pending.described] {
-        file.finish().map_err(|error| unwritten(&path, &error))?;
-        paths.push(path);
+/// Gives a folder's only table its name, and describes it.
+fn written(pending: Pending, folder: &Path) -> Result<(Vec<PathBuf>, usize), Diagnostics> {
+    let (around, described) = description_of(folder);
+    let text = new_text(
+        &Below::new(around),
+        &described,
+        &format!("{:#}\n", schema()),
+    )?;
+    let (table, rows) = pending.finish_table()?;
+    text.finish()
+        .map_err(|error| unwritten(&described, &error))?;
+    Ok((vec![table, described], rows))
+}
+
+/// The description of a folder's only table, and its folder. It is beside the table's folder:
+/// pandas and polars take each file of a folder for a part of one table.
+fn description_of(folder: &Path) -> (PathBuf, PathBuf) {
+    // `.` and `..` have names, too.
+    let named = if folder.file_name().is_some() {
+        Some(folder.to_path_buf())
+    } else {
+        folder.canonicalize().ok()
+    };
+    let parts = named
+        .as_deref()
+        .and_then(|folder| Some((folder.parent()?, folder.file_name()?)));
+    match parts {
+        Some((around, name)) => {
+            let mut name = name.to_os_string();
+            name.push(".schema.json");
+            (around.to_path_buf(), around.join(name))
+        }
+        None => (folder.to_path_buf(), folder.join("schema.json")),
     }
-    Ok((paths, pending.rows))
 }
 
 fn export(
@@ -117,16 +143,14 @@ fn export(
     below
         .create_folder(folder)
         .map_err(|error| unwritten(folder, &error))?;
-    let (table, described) = (folder.join(name), folder.join("schema.json"));
+    let table = folder.join(name);
     let file = below
         .new_file(&table)
         .map_err(|error| unwritten(&table, &error))?;
     let writer = file.writer().map_err(|error| unwritten(&table, &error))?;
     let rows = write(&table, writer)?;
-    let text = new_text(&below, &described, &format!("{:#}\n", schema()))?;
     Ok(Pending {
         table: (table, file),
-        described: (described, text),
         rows,
     })
 }
