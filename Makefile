@@ -5,7 +5,7 @@
 # make notebooks   runs the notebooks on new campaigns, saves their outputs and draws the pictures (RUNS=300)
 # make gallery     writes docs/gallery.md: failures of the shipped campaigns, each with its smallest scene and proof
 #
-# RocksDB and polars are compiled once, in one profile, into a folder outside this checkout (`.ci/env`).
+# Dependencies are compiled once, in one profile, into a folder outside this checkout (`.ci/env`).
 
 .PHONY: build test bench wheel notebooks gallery
 
