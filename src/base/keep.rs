@@ -8,10 +8,10 @@ pub enum Keep {
     /// Everything of every run.
     #[default]
     All,
-    /// Everything of runs in which a property failed or that did not complete, and the outlines of
+    /// Everything of runs in which a property failed or that did not complete, and the outcomes of
     /// the others.
     Failures,
-    /// The outlines of all runs.
+    /// The outcomes of all runs.
     Outcomes,
 }
 
@@ -29,7 +29,7 @@ impl Keep {
     }
 }
 
-/// Which runs of a campaign are kept whole; of the others, the history keeps outlines.
+/// Which runs of a campaign are kept whole; of the others, the history keeps everything except motion.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Keeping {
     /// The rule for all runs.

@@ -132,7 +132,7 @@ fn record(
     })
 }
 
-/// Encodes a run: whole, or only its outline, as the campaign's configuration says.
+/// Encodes a run: whole, or without its motion, as the campaign's configuration says.
 fn entry(env: &Env, record: &RunRecord) -> Result<Entry, Diagnostics> {
     let failed = record.status != RunStatus::Completed
         || record
@@ -147,7 +147,7 @@ fn entry(env: &Env, record: &RunRecord) -> Result<Entry, Diagnostics> {
     {
         Entry::whole(record)
     } else {
-        Entry::outline(record)
+        Entry::outcomes(record)
     }
 }
 

@@ -154,9 +154,9 @@ fn replay(
     options: &ReplayOptions,
 ) -> Result<Replay, Diagnostics> {
     let run = &detail.row.run;
-    // An outline has no motion: its states and the digest over all states are compared.
-    let is_outline = history.is_outline(run)?;
-    let (choices, was) = if is_outline {
+    // Without kept motion, its states and the digest over all states are compared.
+    let is_whole = history.is_whole(run)?;
+    let (choices, was) = if !is_whole {
         history.recorded(run)?
     } else {
         (history.choices(run)?, history.trace(run)?)
@@ -181,7 +181,7 @@ fn replay(
     if options.fit == Fit::Exact && !misfits.is_empty() {
         return Err(unfit(detail, &misfits).into());
     }
-    if is_outline {
+    if !is_whole {
         is.trace.frames.rows.clear();
     }
     let (now, difference) = (

@@ -1,4 +1,4 @@
-//! Makes the motion of runs that have only an outline: simulates them again from their recorded
+//! Makes the motion of runs whose motion is not kept: simulates them again from their recorded
 //! choices.
 
 use std::collections::BTreeMap;

@@ -50,7 +50,7 @@ pub enum ExportKind {
     Rdf(ExportRdfArgs),
     /// The history to a SPARQL 1.1 store of your own, such as Fuseki
     ///
-    /// Sends everything, runs that are kept as outlines too. If it ends early, the same command
+    /// Sends everything, runs that are kept as outcomes too. If it ends early, the same command
     /// continues where it was; later it sends only new runs and judgements. The store then has the
     /// statements of `export rdf FILE.nq`, with IRIs in place of blank nodes. Credentials:
     /// ACTCHECK_SPARQL_USER and ACTCHECK_SPARQL_PASSWORD, or ACTCHECK_SPARQL_TOKEN.

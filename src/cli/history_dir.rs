@@ -37,9 +37,9 @@ pub fn open_to_read(args: &HistoryArgs) -> Result<History, Diagnostics> {
     warned(History::open_to_read(&folder(args)?)?)
 }
 
-/// An open history, after warnings about its journal.
+/// An open history, after warnings about lost ends of its segments.
 fn warned(history: History) -> Result<History, Diagnostics> {
-    if let Some(warning) = history.journal_warning()? {
+    if let Some(warning) = history.tail_warning()? {
         output::print_diagnostics(&warning.into());
     }
     Ok(history)

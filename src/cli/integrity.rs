@@ -16,7 +16,7 @@ pub(super) fn examine(args: &HistoryArgs, format: Format) -> Result<u8, Diagnost
     let dir = history_dir::folder(args)?;
     let (mut found, history) = History::examine(&dir)?;
     let damaged = Mirror::damage(&history)?;
-    let reason = "it differs from the store";
+    let reason = "it differs from the runs";
     found.damage.extend(damaged.iter().map(|file| Damage {
         file: file.strip_prefix(&dir).unwrap_or(file).to_path_buf(),
         run: None,
@@ -27,7 +27,7 @@ pub(super) fn examine(args: &HistoryArgs, format: Format) -> Result<u8, Diagnost
         Format::Csv => table(&found).render(format.into(), output::page()),
         Format::Json => format!("{:#}\n", summary(&found, &dir)),
     });
-    // A mirror is not written from a damaged store.
+    // A mirror is not written from damaged runs.
     if !damaged.is_empty() && found.damage.len() == damaged.len() {
         let told = Mirror::rebuild(&history)
             .map_or_else(|faults| faults, |_| mended(damaged.len()).into());
@@ -50,7 +50,7 @@ fn mended(files: usize) -> Diagnostic {
     };
     Diagnostic::warning(
         "A002",
-        format!("{files} damaged, and the mirror was written anew from the store"),
+        format!("{files} damaged, and the mirror was written anew from the runs"),
     )
     .help("tables and reports made before may be wrong: make them again")
 }
@@ -94,21 +94,15 @@ fn text(found: &Integrity, dir: &Path) -> String {
     }
     if found.damage.is_empty() {
         text = format!(
-            "{}: store, {} traces and mirror are intact\n",
+            "{}: {} runs and mirror are intact\n",
             dir.display(),
             found.runs
         );
     }
-    if found.unlisted > 0 {
+    if !found.unfinished.is_empty() {
         text.push_str(&format!(
-            "{} files of the store have no checksum yet: a process is writing them, or was killed\n",
-            found.unlisted
-        ));
-    }
-    if !found.unused.is_empty() {
-        text.push_str(&format!(
-            "{} traces have no run yet: a process is writing them, or was killed; `actcheck run --resume` makes these runs again\n",
-            found.unused.len()
+            "{} segments end within a run: a process is writing it, or was killed; `actcheck run --resume` makes such runs again\n",
+            found.unfinished.len()
         ));
     }
     text
@@ -133,7 +127,6 @@ fn summary(found: &Integrity, dir: &Path) -> Value {
         "history": dir.display().to_string(),
         "runs": found.runs,
         "damage": found.damage.iter().map(damage).collect::<Vec<_>>(),
-        "without_checksum": found.unlisted,
-        "traces_without_run": found.unused,
+        "unfinished": found.unfinished,
     })
 }

@@ -82,10 +82,6 @@ pub fn merge(args: &MergeArgs) -> Result<u8, Diagnostics> {
         output::print_diagnostics(&faults);
     }
     output::print(&printed(&plan, args.format));
-    merged
-        .warning()
-        .into_iter()
-        .for_each(|warning| warnings.push(warning));
     plan.campaigns
         .iter()
         .filter_map(lacking)
@@ -118,7 +114,6 @@ fn open_all(args: &MergeArgs) -> Result<(Vec<History>, Diagnostics), Diagnostics
         };
         match opened {
             Ok((history, lost)) => {
-                history.rest();
                 lost_runs(dir, &lost)
                     .into_iter()
                     .for_each(|warning| warnings.push(warning));

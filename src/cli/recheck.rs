@@ -161,7 +161,6 @@ fn runs(history: &History, campaigns: &[String]) -> Result<Vec<RunRow>, Diagnost
     }
     let mut runs = faults.or(history.runs(&RunFilter::default())?)?;
     runs.retain(|run| campaigns.is_empty() || campaigns.contains(&run.campaign));
-    history.sort_interleaved(&mut runs)?;
     if runs.is_empty() {
         return Err(Diagnostic::error(
             "X034",

@@ -12,7 +12,7 @@ use actcheck_ontology::Ontology;
 use actcheck_report::{Explained, ReplayedRun};
 use actcheck_rules::{Budget, RuleBook};
 
-/// Most runs of a report that are simulated again, because the history keeps only their outlines.
+/// Most runs of a report that are simulated again, because the history does not keep their motion.
 pub(super) const MOST_RESTORED: usize = 10;
 /// Number of runs that a worker reads ahead.
 const RUNS_OF_A_WORKER: usize = 8;
@@ -78,7 +78,7 @@ pub(super) fn for_each_batch(
     Ok(())
 }
 
-/// Leaves out runs that are kept as outlines, except the first ones: each must be simulated again.
+/// Leaves out runs whose motion is not kept, except the first ones: each must be simulated again.
 fn affordable(history: &History, order: &[String]) -> Result<Vec<String>, Diagnostics> {
     let mut left = MOST_RESTORED;
     let mut affordable = Vec::new();

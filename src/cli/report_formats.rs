@@ -213,7 +213,7 @@ struct AllureFolder<'a> {
     results: usize,
     /// Number of runs whose trace can't be read: it is missing, or another version wrote it.
     untraced: usize,
-    /// Runs that are kept as outlines, with a failure.
+    /// Runs whose motion is not kept, with a failure.
     restored: usize,
     /// Number of these that would have to be simulated again by a program.
     withheld: usize,
@@ -269,9 +269,9 @@ impl<'a> AllureFolder<'a> {
         if judgements.all(|judgement| judgement.outcome == Outcome::Passed) {
             return Ok(Vec::new());
         }
-        let is_outline = self.history.is_outline(&run.row.run).unwrap_or(false);
-        self.restored += usize::from(is_outline);
-        if is_outline && self.restored > MOST_RESTORED {
+        let is_whole = self.history.is_whole(&run.row.run).unwrap_or(true);
+        self.restored += usize::from(!is_whole);
+        if !is_whole && self.restored > MOST_RESTORED {
             return Ok(Vec::new());
         }
         let trace = match unless_damaged(self.history.trace_if_allowed(&run.row.run))? {
@@ -339,7 +339,7 @@ impl<'a> AllureFolder<'a> {
         let others = self.restored.saturating_sub(MOST_RESTORED) + self.withheld;
         if others > 0 {
             told.push(format!(
-                "{others} runs have no pictures and explanations: they are kept as outlines"
+                "{others} runs have no pictures and explanations: their motion is not kept"
             ));
         }
         if self.untraced > 0 {

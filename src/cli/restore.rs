@@ -1,4 +1,4 @@
-//! Simulates runs again that are kept as outlines, when a command needs their motion.
+//! Simulates runs again whose motion is not kept, when a command needs it.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -22,18 +22,18 @@ pub fn allow(history: &History, is_trusted: bool) {
     history.restore_with(restorer(context, Box::new(may_run), move |run| {
         if !IS_NOTED.swap(true, Ordering::Relaxed) {
             note(format!(
-                "run {run} is kept as an outline: its motion is simulated again"
+                "the motion of run {run} is not kept: it is simulated again"
             ));
         }
     }));
 }
 
-/// Prints the cost of simulating the runs that are kept as outlines, if there are many.
+/// Prints the cost of simulating the runs whose motion is not kept, if there are many.
 ///
 /// # Errors
 /// The history can't be read.
 pub fn announce(history: &History, runs: &[RunRow], jobs: usize) -> Result<(), Diagnostics> {
-    let (runs, secs) = history.outlined_cost(runs)?;
+    let (runs, secs) = history.cost_of_motion(runs)?;
     if runs > 1 {
         IS_NOTED.store(true, Ordering::Relaxed);
         let secs = secs / jobs.max(1) as f64;
@@ -43,7 +43,7 @@ pub fn announce(history: &History, runs: &[RunRow], jobs: usize) -> Result<(), D
             format!("{:.0} min", secs / 60.0)
         };
         note(format!(
-            "{runs} runs are kept as outlines: their motion is simulated again, which takes about {time}"
+            "the motion of {runs} runs is not kept: they are simulated again, which takes about {time}"
         ));
     }
     Ok(())

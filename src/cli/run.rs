@@ -95,7 +95,7 @@ pub(super) fn campaign(
         }
         progress.run(&summary);
         runs.push(summary);
-        if runs.len() >= mirrored + MIRROR_EVERY && !session.history.has_waiting() {
+        if runs.len() >= mirrored + MIRROR_EVERY {
             mirror(&session.history);
             mirrored = runs.len();
         }

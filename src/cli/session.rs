@@ -45,7 +45,7 @@ pub struct Session {
 fn notices(history: &History) -> Result<(), Diagnostics> {
     let mut warnings = Diagnostics::new();
     history
-        .journal_warning()?
+        .tail_warning()?
         .into_iter()
         .for_each(|warning| warnings.push(warning));
     history
@@ -219,7 +219,6 @@ pub fn stored(history: &History, env: &Env, id: &str) -> Result<Vec<RunDetail>, 
         ..RunFilter::default()
     })?;
     let mut ids: Vec<String> = rows.into_iter().map(|row| row.run).collect();
-    history.sort_as_stored(id, &mut ids)?;
     let mut kept: Vec<RunDetail> = ids
         .iter()
         .map(|run| history.run(run))

@@ -2,13 +2,21 @@
 //! failed.
 
 use std::collections::BTreeSet;
+use std::sync::LazyLock;
 
-use oxigraph::sparql::QueryEvaluationError;
-use oxigraph::store::Store;
+use regex::Regex;
 
-use crate::threads::cores;
-use crate::{History, RunFilter, RunRow, lists};
+use crate::{History, RunFilter, RunRow};
 use actcheck_base::Diagnostics;
+
+/// Name prefix of campaigns that ran the failed runs of another campaign again.
+pub const FAILED_AGAIN: &str = "failed runs of ";
+
+/// The beginning of the table `case` in the text of a configuration, for each line.
+const CASE: &str = r"^[ \t]*(\[[ \t]*case[ \t]*(\]|\.)|case[ \t]*(\.|=))";
+
+static IS_CASE: LazyLock<Option<Regex>> =
+    LazyLock::new(|| Regex::new(&format!("(?m){CASE}")).ok());
 
 /// Returns the ids of the runs that count in rates over `runs`, which are sorted by time: of runs
 /// with bit-identical traces only the newest counts, because the others add no evidence.
@@ -20,14 +28,6 @@ pub fn newest_of_alike(runs: &[RunRow]) -> BTreeSet<String> {
         .rev()
         .filter(|run| run.trace_hash.is_empty() || seen.insert(&run.trace_hash));
     newest.map(|run| run.run.clone()).collect()
-}
-
-/// Returns the ids of the runs of a store that count in rates over all of its campaigns.
-pub(super) fn counted_runs(store: &Store) -> Result<BTreeSet<String>, QueryEvaluationError> {
-    let selected = lists::selected_campaigns(store)?;
-    let mut runs = lists::runs(store, &RunFilter::default(), cores())?;
-    runs.retain(|run| !selected.contains(&run.campaign));
-    Ok(newest_of_alike(&runs))
 }
 
 /// The function of our own in queries.
@@ -77,18 +77,53 @@ fn counts(run: &str) -> String {
          ?ac_other act:traceHash ?ac_hash ; act:index ?ac_i2 ; act:campaign ?ac_c2 . ?ac_c2 act:number ?ac_n2 . \
          FILTER(?ac_hash != '' && ({campaigns_after} || (?ac_c2 = ?ac_c1 && ({runs_after})))) \
          FILTER NOT EXISTS {{ {} }}",
-        lists::is_selected("?ac_c2")
+        is_selected("?ac_c2")
     );
-    let selected = format!("{run} act:campaign ?ac_c . {}", lists::is_selected("?ac_c"));
+    let selected = format!("{run} act:campaign ?ac_c . {}", is_selected("?ac_c"));
     format!("(NOT EXISTS {{ {selected} }} && NOT EXISTS {{ {newer} }})")
 }
 
+/// A pattern on one line that matches if a campaign is one of [`History::selected_campaigns`].
+/// `campaign` is a variable.
+fn is_selected(campaign: &str) -> String {
+    let case = CASE.replace('\\', r"\\");
+    format!(
+        "{{ ?ac_run act:shrunkFrom ?ac_original ; act:campaign {campaign} }} UNION \
+         {{ {campaign} a act:Campaign ; rdfs:label ?ac_name FILTER(STRSTARTS(?ac_name, '{FAILED_AGAIN}')) }} UNION \
+         {{ {campaign} a act:Campaign ; act:configText ?ac_text FILTER(REGEX(?ac_text, '{case}', 'm')) }}"
+    )
+}
+
 impl History {
+    /// Returns the ids of the campaigns whose scenes were selected because they fail: those that
+    /// hold a shrunk run, those that ran the failed runs of another campaign again, and cases,
+    /// which have the table `case` in their configuration. Statistics leave them out.
+    ///
+    /// # Errors
+    /// A file is damaged or can't be read.
+    pub fn selected_campaigns(&self) -> Result<BTreeSet<String>, Diagnostics> {
+        let mut selected = BTreeSet::new();
+        for state in self.campaign_states()? {
+            let record = &state.record;
+            let is_case = || {
+                let pattern = IS_CASE.as_ref();
+                pattern.is_some_and(|pattern| pattern.is_match(&record.config_text))
+            };
+            let is_selected = record.name.starts_with(FAILED_AGAIN)
+                || is_case()
+                || self.runs_of(&record.id)?.iter().any(|run| run.row.is_shrunk);
+            if is_selected {
+                selected.insert(record.id.clone());
+            }
+        }
+        Ok(selected)
+    }
+
     /// Returns the ids of the runs that count in rates over all campaigns: not those of
     /// [`History::selected_campaigns`], and of runs with bit-identical traces only the newest.
     ///
     /// # Errors
-    /// The store can't be read.
+    /// A file is damaged or can't be read.
     pub fn counted_runs(&self) -> Result<BTreeSet<String>, Diagnostics> {
         let selected = self.selected_campaigns()?;
         let mut runs = self.runs(&RunFilter::default())?;

@@ -5,81 +5,72 @@ use std::io::{self, BufWriter, Write as _};
 use std::path::Path;
 
 use oxigraph::io::{RdfFormat, RdfSerializer};
-use oxigraph::model::GraphNameRef;
+use oxigraph::model::Quad;
 
 use crate::rdf_text::serializer;
-use crate::write_run::run_node;
-use crate::{History, RdfSyntax, graphs};
+use crate::statements::Statements;
+use crate::view::{Demand, Source, WithFacts};
+use crate::{History, RdfSyntax, write_campaign};
 use actcheck_base::{Diagnostic, Diagnostics, NewFile};
-use actcheck_facts::extract_complete;
 
 impl History {
+    /// Calls `each` with all statements, campaign by campaign and run by run.
+    ///
+    /// # Errors
+    /// A file is damaged or can't be read; those of `each`.
+    fn each_statements(
+        &self,
+        facts: WithFacts,
+        each: &mut dyn FnMut(Vec<Quad>) -> Result<(), Diagnostics>,
+    ) -> Result<(), Diagnostics> {
+        let demand = Demand::all();
+        for state in self.campaign_states()? {
+            let mut statements = Statements::new(&demand);
+            write_campaign::write(&state, &mut statements);
+            each(statements.quads)?;
+            let runs = self.runs_of(&state.record.id)?;
+            let source = Source::new(self, &runs.id);
+            for run in runs.iter() {
+                let later = runs.later_of(run.row.index);
+                each(source.statements(run, &later, &demand, facts)?.quads)?;
+            }
+        }
+        Ok(())
+    }
+
     /// Writes the whole history as N-Quads, including facts and later judgements in their named
     /// graphs.
     ///
     /// # Errors
-    /// `H016` the file can't be written, or the store can't be read.
+    /// `H016` the file can't be written; a file of the history is damaged or can't be read.
     pub fn write_nquads(&self, file: &Path) -> Result<(), Diagnostics> {
-        let store = self.store()?;
-        let failed = |why: &dyn std::fmt::Display| unwritten(file, &why.to_string());
-        let (new, writer) = begin(file).map_err(|error| failed(&error))?;
-        let mut writer = RdfSerializer::from_format(RdfFormat::NQuads).for_writer(writer);
-        for quad in store.iter() {
-            let quad = quad.map_err(|error| failed(&error))?;
-            writer
-                .serialize_quad(&quad)
-                .map_err(|error| failed(&error))?;
-        }
-        self.each_outlines_quads(true, &mut |quads| {
-            quads
-                .iter()
-                .try_for_each(|quad| writer.serialize_quad(quad))
-                .map_err(|error| failed(&error))
-        })?;
-        writer
-            .finish()
-            .and_then(|mut writer| writer.flush())
-            .and_then(|()| new.finish())
-            .map_err(|error| failed(&error))
+        self.write_quads(file, WithFacts::Lean)
     }
 
     /// Writes the whole history as N-Quads like [`History::write_nquads`], but with complete facts
-    /// from the traces in place of those in the store, which has only facts that queries ask for.
+    /// in place of those that queries ask for.
     ///
     /// # Errors
-    /// As [`History::write_nquads`], and as [`History::trace`] for each run.
+    /// As [`History::write_nquads`].
     pub fn write_complete_nquads(&self, file: &Path) -> Result<(), Diagnostics> {
-        let store = self.store()?;
-        let failed = |why: &dyn std::fmt::Display| unwritten(file, &why.to_string());
-        let (new, writer) = begin(file).map_err(|error| failed(&error))?;
+        self.write_quads(file, WithFacts::Complete)
+    }
+
+    fn write_quads(&self, file: &Path, facts: WithFacts) -> Result<(), Diagnostics> {
+        let failed = |why: io::Error| unwritten(file, &why.to_string());
+        let (new, writer) = begin(file).map_err(failed)?;
         let mut writer = RdfSerializer::from_format(RdfFormat::NQuads).for_writer(writer);
-        for quad in store.iter() {
-            let quad = quad.map_err(|error| failed(&error))?;
-            if !graphs::holds_facts(quad.graph_name.as_ref()) {
-                writer
-                    .serialize_quad(&quad)
-                    .map_err(|error| failed(&error))?;
-            }
-        }
-        self.each_outlines_quads(false, &mut |quads| {
+        self.each_statements(facts, &mut |quads| {
             quads
                 .iter()
                 .try_for_each(|quad| writer.serialize_quad(quad))
-                .map_err(|error| failed(&error))
+                .map_err(failed)
         })?;
-        for run in self.ids("act:Run")? {
-            let facts = extract_complete(&self.states(&run)?);
-            for quad in graphs::complete(&facts, &run_node(&run)) {
-                writer
-                    .serialize_quad(&quad)
-                    .map_err(|error| failed(&error))?;
-            }
-        }
         writer
             .finish()
             .and_then(|mut writer| writer.flush())
             .and_then(|()| new.finish())
-            .map_err(|error| failed(&error))
+            .map_err(failed)
     }
 
     /// Writes the default graph as Turtle: campaigns, runs, executions, scenes and outcomes. Turtle
@@ -88,27 +79,21 @@ impl History {
     /// # Errors
     /// As [`History::write_nquads`].
     pub fn write_turtle(&self, file: &Path) -> Result<(), Diagnostics> {
-        let store = self.store()?;
-        let failed = |why: &dyn std::fmt::Display| unwritten(file, &why.to_string());
-        let (new, writer) = begin(file).map_err(|error| failed(&error))?;
+        let failed = |why: io::Error| unwritten(file, &why.to_string());
+        let (new, writer) = begin(file).map_err(failed)?;
         let mut writer = serializer(RdfSyntax::Turtle).for_writer(writer);
-        for quad in store.quads_for_pattern(None, None, None, Some(GraphNameRef::DefaultGraph)) {
-            let quad = quad.map_err(|error| failed(&error))?;
-            writer
-                .serialize_triple(quad.as_ref())
-                .map_err(|error| failed(&error))?;
-        }
-        self.each_outlines_quads(false, &mut |quads| {
-            quads
-                .iter()
-                .try_for_each(|quad| writer.serialize_triple(quad.as_ref()))
-                .map_err(|error| failed(&error))
+        self.each_statements(WithFacts::No, &mut |quads| {
+            let of_default = quads.iter().filter(|quad| quad.graph_name.is_default_graph());
+            of_default
+                .map(|quad| writer.serialize_triple(oxigraph::model::TripleRef::from(quad.as_ref())))
+                .collect::<io::Result<()>>()
+                .map_err(failed)
         })?;
         writer
             .finish()
             .and_then(|mut writer| writer.flush())
             .and_then(|()| new.finish())
-            .map_err(|error| failed(&error))
+            .map_err(failed)
     }
 }
 

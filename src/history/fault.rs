@@ -3,8 +3,9 @@
 use std::io::ErrorKind;
 use std::path::Path;
 
-use oxigraph::store::StorageError;
-
+use crate::campaign::RunAt;
+use crate::folder::Folder;
+use crate::segment::{ReadFault, SegmentColumn};
 use actcheck_base::{Diagnostic, Diagnostics, FileKind, NotPlain};
 
 /// H001: a folder can't be used as a history, or can't be accessed.
@@ -27,26 +28,6 @@ pub(super) fn in_use(dir: &Path) -> Diagnostics {
     .into()
 }
 
-/// H002: another process is creating the history.
-pub(super) fn being_created(dir: &Path) -> Diagnostics {
-    Diagnostic::error(
-        "H002",
-        format!(
-            "the history `{}` is being created by another process",
-            dir.display()
-        ),
-    )
-    .help("try again in a moment: it has no runs yet")
-    .into()
-}
-
-/// H003: the process that created the history was stopped before it was complete.
-pub(super) fn not_created(dir: &Path) -> Diagnostics {
-    Diagnostic::error("H003", format!("the history `{}` has no runs: its creation was interrupted", dir.display()))
-        .help("`actcheck run CONFIG` completes it, and adds runs; or name another folder with `--history DIR`")
-        .into()
-}
-
 /// H027: a file of the history is a link or a special file.
 pub(super) fn not_plain(dir: &Path, path: &Path, kind: FileKind) -> Diagnostics {
     let message = format!(
@@ -59,17 +40,6 @@ pub(super) fn not_plain(dir: &Path, path: &Path, kind: FileKind) -> Diagnostics 
             "actcheck writes only plain files there, and follows no link: remove it if you do not know its origin; a history \
              elsewhere is named with `--history DIR`",
         )
-        .into()
-}
-
-/// H027: a file of the store would fill the memory, or be read for hours.
-pub(super) fn too_long(dir: &Path, path: &Path) -> Diagnostics {
-    let (dir, path) = (dir.display(), path.display());
-    let message = format!(
-        "the history `{dir}` can't be used: `{path}` is far longer than any that this program writes"
-    );
-    Diagnostic::error("H027", message)
-        .help("remove the file if you do not know its origin; a history elsewhere is named with `--history DIR`")
         .into()
 }
 
@@ -112,50 +82,72 @@ pub(super) fn io(dir: &Path, doing: &str, error: &std::io::Error) -> Diagnostics
     failed(dir, doing, error.kind(), &error.to_string())
 }
 
-/// The store failed.
-pub(super) fn store(dir: &Path, doing: &str, error: &StorageError) -> Diagnostics {
-    match error {
-        StorageError::Io(error) => io(dir, doing, error),
-        StorageError::Corruption(error) => damaged(dir, &error.to_string()),
-        other => failed(dir, doing, ErrorKind::Other, &other.to_string()),
+/// H007: a file of a segment or of a campaign is damaged; or it can't be read.
+pub(super) fn segment(folder: &Folder, file: &Path, fault: &ReadFault) -> Diagnostics {
+    match fault {
+        ReadFault::Io(error) => io(folder.dir(), &format!("reading `{}`", file.display()), error),
+        ReadFault::Damaged(fault) => {
+            let file = folder.relative(file).display();
+            damaged(folder.dir(), &format!("`{file}`: {fault}"))
+        }
     }
 }
 
-/// A reader can't write its temporary files.
-pub(super) fn temporary(dir: &Path, error: &std::io::Error) -> Diagnostics {
-    let folder = std::env::temp_dir();
-    let message = format!(
-        "the history `{}` can't be read: temporary files in `{}` can't be written: {}",
-        dir.display(),
-        folder.display(),
-        lower(&error.to_string())
-    );
-    Diagnostic::error("H001", message)
-        .help("free some space there, or name another folder with `TMPDIR`")
+/// H007: a segment has fewer runs or judgements than it had.
+pub(super) fn shortened(folder: &Folder, file: &Path) -> Diagnostics {
+    let file = folder.relative(file).display();
+    damaged(folder.dir(), &format!("`{file}` is shorter than it was"))
+}
+
+/// H007: a value of a run is damaged; or it can't be read.
+pub(super) fn run(
+    folder: &Folder,
+    id: &str,
+    run: RunAt<'_>,
+    column: SegmentColumn,
+    fault: &ReadFault,
+) -> Diagnostics {
+    let file = run.segment.file(column);
+    match fault {
+        ReadFault::Io(error) if error.kind() == ErrorKind::NotFound => missing(folder, id, &file),
+        ReadFault::Io(_) => segment(folder, &file, fault),
+        ReadFault::Damaged(fault) => {
+            let file = folder.relative(&file).display();
+            damaged(folder.dir(), &format!("`{file}`, run {id}: {fault}"))
+        }
+    }
+}
+
+/// H007: the content of a value of a run is none of this program.
+pub(super) fn undecodable(
+    folder: &Folder,
+    id: &str,
+    run: RunAt<'_>,
+    column: SegmentColumn,
+    why: &str,
+) -> Diagnostics {
+    let file = run.segment.file(column);
+    let file = folder.relative(&file).display();
+    damaged(folder.dir(), &format!("`{file}`, run {id}: {why}"))
+}
+
+/// H009: a file of a segment is missing.
+fn missing(folder: &Folder, id: &str, file: &Path) -> Diagnostics {
+    let message = format!("values of run {id} can't be read: `{}` is missing", file.display());
+    Diagnostic::error("H009", message)
+        .help(format!(
+            "restore the file from a backup; the other files of the history `{}` are intact",
+            folder.dir().display()
+        ))
         .into()
 }
 
-/// A reader can't open its copy of the store, or add to it.
-pub(super) fn unread(dir: &Path, error: &StorageError) -> Diagnostics {
-    match error {
-        StorageError::Io(error)
-            if matches!(
-                error.kind(),
-                ErrorKind::StorageFull | ErrorKind::QuotaExceeded
-            ) =>
-        {
-            temporary(dir, error)
-        }
-        other => damaged(dir, &other.to_string()),
-    }
-}
-
-/// H007: a file of the store differs from its checksum.
-pub(super) fn damaged_file(dir: &Path, name: &str) -> Diagnostics {
-    damaged(
-        dir,
-        &format!("`store/{name}` has changed since it was written"),
-    )
+/// H008: there is no such run.
+pub(super) fn no_run(dir: &Path, name: &str) -> Diagnostics {
+    let message = format!("the history `{}` has no run `{name}`", dir.display());
+    Diagnostic::error("H008", message)
+        .help("`actcheck list` shows all runs")
+        .into()
 }
 
 /// H006: this process, or the system, has too many open files. Returns `None` if a message has
@@ -221,9 +213,6 @@ fn failed(dir: &Path, doing: &str, kind: ErrorKind, text: &str) -> Diagnostics {
     }
     if let Some(fault) = too_many_files(dir, text) {
         return fault;
-    }
-    if has(&["lock file", "lock hold by"]) {
-        return in_use(dir);
     }
     match kind {
         ErrorKind::PermissionDenied => unusable(dir, "writing there is not permitted"),

@@ -1,47 +1,40 @@
 //! The folder of a history: its layout, its version, and its lock.
 //!
-//! `VERSION` names the format; `lock` is held while a process writes; `store/` is the RDF store,
-//! and `seal/` has the checksums of its files; `journal` has the statements that are not in its
-//! tables yet; `traces/` has one file for each run that is kept whole, `outlines/` the others;
-//! `hulls/` caches the convex solids of meshes, which can be recomputed at any time.
+//! `VERSION` names the format; `lock` is held while a process writes; `campaigns/ID/` has the
+//! campaign and its segments; `tables/` and `hulls/` hold values that can be made again from these,
+//! and `sent/` the parts that other stores have received.
 
+use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
 use std::io::{self, ErrorKind};
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 use std::thread::sleep;
 use std::time::Duration;
 
-use crate::snapshot::LONGEST_COPIED;
-use crate::{fault, journal};
-use actcheck_base::{Below, Diagnostics, FileKind};
+use crate::fault;
+use crate::segment::SegmentColumn;
+use actcheck_base::{Below, Diagnostics, Digest, FileKind, names};
 
 /// Format of the folder. It changes whenever a file of it does.
-const FORMAT: u64 = 4;
+const FORMAT: u64 = 5;
 const TITLE: &str = "actcheck history";
-/// The mark of a folder with a journal, which follows the format: without it, a lost journal would
-/// not be noticed.
-const WITH_JOURNAL: &str = "journal";
 /// Longest version file. Unit: bytes.
 const LONGEST_VERSION: u64 = 1_000;
-/// Longest file of a history that is read as a whole: those of this program have some megabytes.
-/// Unit: bytes.
-pub(super) const LONGEST: u64 = 256 << 20;
+/// Longest file that is read as a whole, which only the examination of damage does. Unit: bytes.
+const LONGEST: u64 = 16 << 30;
 /// The names in the folder of a history that this program opens, with their kinds. Others are left
 /// alone.
-const LAYOUT: [(&str, FileKind); 10] = [
+const LAYOUT: [(&str, FileKind); 6] = [
     ("VERSION", FileKind::File),
     ("lock", FileKind::File),
-    (journal::NAME, FileKind::File),
-    ("store", FileKind::Folder),
-    ("seal", FileKind::Folder),
-    ("traces", FileKind::Folder),
-    ("outlines", FileKind::Folder),
+    ("campaigns", FileKind::Folder),
     ("tables", FileKind::Folder),
     ("hulls", FileKind::Folder),
     ("sent", FileKind::Folder),
 ];
-/// Number of tries to lock a folder: a reader holds the lock for a moment if it finds the store
-/// incomplete.
+/// Number of tries to lock a folder: a reader holds the lock for a moment when it looks whether
+/// another process does.
 const TRIES: usize = 10;
 /// Time between two tries.
 const PAUSE: Duration = Duration::from_millis(10);
@@ -83,10 +76,10 @@ impl Folder {
             lock: Some(lock(dir)?),
         };
         if !known {
-            folder.write_version(false)?;
+            folder.write_version()?;
         }
-        let traces = folder.below().create_folder(&folder.traces());
-        traces.map_err(|error| fault::io(dir, "creating the folder of traces", &error))?;
+        let campaigns = folder.below().create_folder(&folder.campaigns());
+        campaigns.map_err(|error| fault::io(dir, "creating the folder of campaigns", &error))?;
         Ok(folder)
     }
 
@@ -114,43 +107,13 @@ impl Folder {
         lock.is_ok_and(|lock| matches!(lock.try_lock_shared(), Err(TryLockError::WouldBlock)))
     }
 
-    /// Marks the folder before its journal is created, or after it was removed, so that a lost
-    /// journal is noticed.
-    pub(super) fn mark_journal(&self, exists: bool) -> Result<(), Diagnostics> {
-        if version(&self.dir)?.is_some_and(|version| version.has_journal == exists) {
-            Ok(())
-        } else {
-            self.write_version(exists)
-        }
+    /// Whether this process owns the folder.
+    pub(super) fn is_own(&self) -> bool {
+        self.lock.is_some()
     }
 
-    /// Whether there is a journal that no other process writes, and whether the version says that
-    /// there is one.
-    pub(super) fn has_journal(&self) -> (bool, bool) {
-        if self.lock.is_none() && self.is_locked() {
-            return (false, false);
-        }
-        let exists = self.below().kind(&self.dir.join(journal::NAME)).is_some();
-        (
-            exists,
-            version(&self.dir)
-                .is_ok_and(|version| version.is_some_and(|version| version.has_journal)),
-        )
-    }
-
-    /// Creates the folder of outlines.
-    pub(super) fn begin_outlines(&self) -> Result<(), Diagnostics> {
-        if self.outlines().exists() {
-            return Ok(());
-        }
-        let created = self.below().create_folder(&self.outlines());
-        created.map_err(|error| fault::io(&self.dir, "creating its outlines", &error))
-    }
-
-    fn write_version(&self, has_journal: bool) -> Result<(), Diagnostics> {
-        let mark = if has_journal { WITH_JOURNAL } else { "" };
-        let text = format!("{TITLE} {FORMAT} {mark}");
-        let line = format!("{}\n", text.trim_end());
+    fn write_version(&self) -> Result<(), Diagnostics> {
+        let line = format!("{TITLE} {FORMAT}\n");
         self.below()
             .write_atomic(&self.dir.join("VERSION"), line.as_bytes())
             .map_err(|error| fault::io(&self.dir, "writing its version", &error))
@@ -166,84 +129,168 @@ impl Folder {
         &self.dir
     }
 
-    /// Where the RDF store is.
-    pub(super) fn store(&self) -> PathBuf {
-        self.dir.join("store")
+    /// Where the campaigns are.
+    pub(super) fn campaigns(&self) -> PathBuf {
+        self.dir.join("campaigns")
     }
 
-    /// Where the checksums of the store's files are.
-    pub(super) fn seal(&self) -> PathBuf {
-        self.dir.join("seal")
+    /// Where a campaign and its segments are.
+    pub(super) fn campaign(&self, id: &str) -> PathBuf {
+        self.campaigns().join(id)
     }
 
-    /// Where the traces are.
-    pub(super) fn traces(&self) -> PathBuf {
-        self.dir.join("traces")
+    /// A path as messages name it: relative to the history.
+    pub(super) fn relative<'p>(&self, path: &'p Path) -> &'p Path {
+        path.strip_prefix(&self.dir).unwrap_or(path)
     }
 
-    /// Where the outlines of runs are that are not kept whole.
-    pub(super) fn outlines(&self) -> PathBuf {
-        Self::outlines_in(&self.dir)
+    /// The files of all campaigns at this moment.
+    ///
+    /// # Errors
+    /// `H026` a name is not an id, `H027` a file is a link or a special file; a folder can't be
+    /// read.
+    pub(super) fn extent(&self) -> Result<FolderExtent, Diagnostics> {
+        let folder = self.campaigns();
+        let below = self.below();
+        if below.kind(&folder).is_none() {
+            return Ok(FolderExtent::default());
+        }
+        let entries = below
+            .entries(&folder)
+            .map_err(|error| fault::io(&self.dir, "reading the folder", &error))?;
+        let mut campaigns = BTreeMap::new();
+        for (name, kind) in entries {
+            let path = folder.join(&name);
+            if kind != FileKind::Folder {
+                return Err(fault::not_plain(&self.dir, &path, kind));
+            }
+            let id = name.to_string_lossy().into_owned();
+            if !names::is_id(&id) {
+                return Err(fault::foreign_id(&self.dir, "campaign", &id));
+            }
+            if let Some(extent) = self.campaign_extent(&id)? {
+                campaigns.insert(id, extent);
+            }
+        }
+        Ok(FolderExtent { campaigns })
     }
 
-    /// Where the outlines are in the folder of a history.
-    pub(super) fn outlines_in(dir: &Path) -> PathBuf {
-        dir.join("outlines")
-    }
-
-    /// The ids of the runs that have a trace, sorted.
-    pub(super) fn traced(&self) -> Vec<String> {
-        let files = self.below().files(&self.traces()).into_iter();
-        files
-            .filter_map(|file| {
-                Some(
-                    file.file_name()?
-                        .to_str()?
-                        .strip_suffix(".trace")?
-                        .to_owned(),
-                )
-            })
-            .collect()
+    /// The files of a campaign at this moment. Returns `None` if there is no such campaign, or if
+    /// it is just being created.
+    ///
+    /// # Errors
+    /// As [`Folder::extent`].
+    pub(super) fn campaign_extent(&self, id: &str) -> Result<Option<CampaignExtent>, Diagnostics> {
+        let folder = self.campaign(id);
+        let entries = match self.below().entries(&folder) {
+            Ok(entries) => entries,
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(fault::io(&self.dir, "reading the folder", &error)),
+        };
+        let mut extent = CampaignExtent::default();
+        let mut has_state = false;
+        for (name, kind) in entries {
+            let Some((number, column)) = name.to_str().and_then(part_of_name) else {
+                continue;
+            };
+            let path = folder.join(&name);
+            if kind != FileKind::File {
+                return Err(fault::not_plain(&self.dir, &path, kind));
+            }
+            let metadata = match path.symlink_metadata() {
+                Ok(metadata) => metadata,
+                // The owner has removed it.
+                Err(error) if error.kind() == ErrorKind::NotFound => continue,
+                Err(error) => return Err(fault::io(&self.dir, "reading the folder", &error)),
+            };
+            let length = metadata.len();
+            if column == SegmentColumn::Campaign {
+                has_state = true;
+                extent.state = [length, metadata.ino(), metadata.mtime_nsec().cast_unsigned()];
+                continue;
+            }
+            let segment = extent.segments.entry(number).or_default();
+            match column {
+                SegmentColumn::Runs => segment.runs = Some(length),
+                SegmentColumn::Judgements => segment.judgements = Some(length),
+                _ => {}
+            }
+        }
+        Ok(has_state.then_some(extent))
     }
 
     /// Whether a history has a file of this path in its folder.
     pub(super) fn writes(path: &Path) -> bool {
-        let mut names = path.iter().map(|name| name.to_str().unwrap_or_default());
-        let (first, second) = (
-            names.next().unwrap_or_default(),
-            names.next().unwrap_or_default(),
-        );
-        let ends = |endings: &[&str]| endings.iter().any(|ending| second.ends_with(ending));
-        let is_ours = match first {
-            "store" => {
-                let begins = ["MANIFEST-", "OPTIONS-", "LOG", "bulk-"]
-                    .iter()
-                    .any(|start| second.starts_with(start));
-                begins
-                    || ["CURRENT", "IDENTITY", "LOCK"].contains(&second)
-                    || ends(&[".sst", ".log", ".dbtmp"])
+        let names: Vec<&str> = path
+            .iter()
+            .map(|name| name.to_str().unwrap_or_default())
+            .collect();
+        let ends = |name: &str, endings: &[&str]| endings.iter().any(|e| name.ends_with(e));
+        match names[..] {
+            ["VERSION" | "lock"] => true,
+            ["campaigns", _, file] => part_of_name(file).is_some(),
+            ["tables", file] => {
+                ["FILES", "SCHEMA", "RECHECKED"].contains(&file) || ends(file, &[".parquet"])
             }
-            "seal" => ["SUMS", "CURRENT"].contains(&second) || second.starts_with("MANIFEST-"),
-            "traces" => ends(&[".trace"]),
-            "outlines" => ends(&[".outline", ".outlines"]),
-            "tables" => ["FILES", "SCHEMA", "RECHECKED"].contains(&second) || ends(&[".parquet"]),
-            "hulls" => ends(&[".hulls"]),
-            "sent" => !second.is_empty(),
-            "VERSION" | "lock" | journal::NAME => second.is_empty(),
+            ["hulls", file] => ends(file, &[".hulls"]),
+            ["sent", _] => true,
             _ => false,
-        };
-        is_ours && names.next().is_none()
-    }
-
-    /// File of a run's trace.
-    pub(super) fn trace(&self, run: &str) -> PathBuf {
-        self.traces().join(format!("{run}.trace"))
+        }
     }
 }
 
+/// The files of a history at one moment.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct FolderExtent {
+    pub campaigns: BTreeMap<String, CampaignExtent>,
+}
+
+impl FolderExtent {
+    /// A text that is equal for equal extents.
+    pub(super) fn digest(&self) -> String {
+        let mut digest = Digest::new();
+        for (id, campaign) in &self.campaigns {
+            digest.update(id.as_bytes());
+            digest.update(format!("{campaign:?}").as_bytes());
+        }
+        digest.finish()
+    }
+}
+
+/// The files of a campaign at one moment.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct CampaignExtent {
+    /// Length (bytes), number and time of the file of the campaign itself, which is replaced as a
+    /// whole.
+    pub state: [u64; 3],
+    /// Its segments by number.
+    pub segments: BTreeMap<u32, SegmentExtent>,
+}
+
+/// The files of a segment at one moment.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct SegmentExtent {
+    /// Length of its column of runs. Unit: bytes.
+    pub runs: Option<u64>,
+    /// Length of its column of judgements. Unit: bytes.
+    pub judgements: Option<u64>,
+}
+
+/// The segment and the column of a file in the folder of a campaign; the campaign itself has the
+/// number 0. Returns `None` for any other name.
+fn part_of_name(name: &str) -> Option<(u32, SegmentColumn)> {
+    if name == SegmentColumn::Campaign.extension() {
+        return Some((0, SegmentColumn::Campaign));
+    }
+    let (number, extension) = name.split_once('.')?;
+    let column = SegmentColumn::OF_SEGMENTS
+        .into_iter()
+        .find(|column| column.extension() == extension)?;
+    let number: u32 = number.parse().ok()?;
+    (number > 0).then_some((number, column))
+}
+
 /// Checks that files and folders of a history are files and folders, not links, pipes or devices.
-/// The library opens the files of the store and of its seal by their paths, so these are checked
-/// one by one.
 ///
 /// # Errors
 /// `H027` one is of another kind.
@@ -256,74 +303,38 @@ fn check_layout(dir: &Path) -> Result<(), Diagnostics> {
             _ => {}
         }
     }
-    for folder in ["store", "seal"].map(|name| dir.join(name)) {
-        let entries = below
-            .entries(&folder)
-            .map_err(|error| fault::io(dir, "reading the folder", &error))?;
-        if let Some((name, kind)) = entries.iter().find(|(_, kind)| *kind != FileKind::File) {
-            return Err(fault::not_plain(dir, &folder.join(name), *kind));
-        }
-        // RocksDB reads its logs and manifests to their ends before it opens a store.
-        let mut paths = entries.iter().map(|(name, _)| folder.join(name));
-        let is_table = |path: &Path| path.extension().is_some_and(|ending| ending == "sst");
-        let is_long = |path: &Path| {
-            path.symlink_metadata()
-                .is_ok_and(|found| found.len() > LONGEST_COPIED)
-        };
-        if let Some(path) = paths.find(|path| !is_table(path) && is_long(path)) {
-            return Err(fault::too_long(dir, &path));
-        }
-    }
     Ok(())
 }
 
-/// Opens a file in a folder of a history; the folder was checked when the history was opened.
-pub(super) fn open(path: &Path) -> io::Result<File> {
-    Below::new(path.parent().unwrap_or(path)).open(path)
+/// Reads a file of a history as a whole.
+///
+/// # Errors
+/// It is missing, far longer than any that this program writes, or can't be read.
+pub(super) fn read_all(below: &Below, path: &Path) -> io::Result<Vec<u8>> {
+    below.read(path, LONGEST)
 }
 
-/// Reads such a file.
-pub(super) fn read(path: &Path) -> io::Result<Vec<u8>> {
-    Below::new(path.parent().unwrap_or(path)).read(path, LONGEST)
-}
-
-/// Whether the folder has a history that this program can read.
+/// Whether the folder has a version that this program reads.
+///
+/// # Errors
+/// `H003` it holds other files, `H004` it has another format.
 fn has_version(dir: &Path) -> Result<bool, Diagnostics> {
-    match version(dir)? {
-        Some(version) if version.format != FORMAT => {
-            Err(fault::other_format(dir, version.format, FORMAT))
-        }
-        version => Ok(version.is_some()),
-    }
-}
-
-/// The content of the version file.
-struct Version {
-    format: u64,
-    /// Whether the folder has a journal, unless it was lost.
-    has_journal: bool,
-}
-
-/// The version of the history in a folder. Returns `None` if it has none.
-fn version(dir: &Path) -> Result<Option<Version>, Diagnostics> {
     let text = match Below::new(dir).read_text(&dir.join("VERSION"), LONGEST_VERSION) {
         Ok(text) => text,
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(false),
         // It is too long, or not text.
         Err(error) if [ErrorKind::InvalidData, ErrorKind::Other].contains(&error.kind()) => {
             return Err(fault::foreign(dir));
         }
         Err(error) => return Err(fault::io(dir, "reading its version", &error)),
     };
-    let mut words = text
-        .strip_prefix(TITLE)
-        .unwrap_or_default()
-        .split_whitespace();
-    match words.next().and_then(|number| number.parse().ok()) {
-        Some(format) => Ok(Some(Version {
-            format,
-            has_journal: words.next() == Some(WITH_JOURNAL),
-        })),
+    let number = text.strip_prefix(TITLE).and_then(|rest| {
+        let number = rest.split_whitespace().next();
+        number.and_then(|number| number.parse::<u64>().ok())
+    });
+    match number {
+        Some(FORMAT) => Ok(true),
+        Some(theirs) => Err(fault::other_format(dir, theirs, FORMAT)),
         None => Err(fault::foreign(dir)),
     }
 }
@@ -349,8 +360,7 @@ fn lock(dir: &Path) -> Result<File, Diagnostics> {
         match file.try_lock() {
             Ok(()) => return Ok(file),
             Err(TryLockError::WouldBlock) => sleep(PAUSE),
-            // Some network file systems don't support locks; the store's own lock still protects
-            // it.
+            // Some network file systems don't support locks.
             Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => {
                 return Ok(file);
             }

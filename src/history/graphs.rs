@@ -1,13 +1,12 @@
 //! Facts as named graphs, for users' queries.
 //!
-//! A quad in a named graph takes about 250 bytes on disk. The graphs therefore omit properties that
-//! follow from others, properties that never change during a run, and all but the strongest contact
-//! of each pair. Nothing is lost: the trace has everything, and rules judge stored runs by facts
-//! that are extracted from it.
+//! The graphs omit properties that follow from others, properties that never change during a run,
+//! and all but the strongest contact of each pair. Nothing is lost: the states have everything, and
+//! rules judge stored runs by facts that are extracted from them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use oxigraph::model::{GraphName, GraphNameRef, NamedNode, NamedOrBlankNode, Quad, Term};
+use oxigraph::model::{GraphName, NamedNode, NamedOrBlankNode, Quad, Term};
 
 use crate::terms::to_store;
 use actcheck_base::{RunFacts, TermId, Terms, Triple, names};
@@ -58,17 +57,6 @@ pub(super) fn state_graph(run: &NamedNode, state: usize) -> NamedNode {
 /// Graph of the events during an action. `step` counts from 0, the graph's name from 1.
 pub(super) fn during_graph(run: &NamedNode, step: usize) -> NamedNode {
     below(run, &format!("{}/during", step + 1))
-}
-
-/// Returns whether the name of a graph is that of a state or of the events during an action.
-pub(super) fn holds_facts(graph: GraphNameRef<'_>) -> bool {
-    let GraphNameRef::NamedNode(node) = graph else {
-        return false;
-    };
-    let Some((run, part)) = node.as_str().rsplit_once('/') else {
-        return false;
-    };
-    run.starts_with(names::RUN) && (part == "during" || run.ends_with("/state"))
 }
 
 /// Writes the facts of a run that queries ask for into its graphs.

@@ -1,15 +1,16 @@
 //! Compares the files of a history with their checksums and with each other.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use crate::folder::{self, Folder};
-use crate::salvage::scan;
-use crate::seal::{Found, Seal};
-use crate::tail::Tail;
-use crate::threads::cores;
-use crate::write_run::run_node;
-use crate::{History, RunFilter, detail, fault, journal, pending, trace_file, trace_parts};
+use crate::campaign::{CampaignRuns, RunAt};
+use crate::campaign_state::CampaignState;
+use crate::folder::{CampaignExtent, Folder};
+use crate::history::run_id;
+use crate::segment::{ReadFault, Segment, SegmentColumn, read_judgements, salvage_judgements};
+use crate::trace_codec::{decode_head, decode_motion};
+use crate::{History, fault};
 use actcheck_base::Diagnostics;
 
 /// A damaged or missing part of a history.
@@ -30,185 +31,216 @@ pub struct Integrity {
     pub damage: Vec<Damage>,
     /// Number of runs.
     pub runs: usize,
-    /// Number of tables of the store without a checksum, which only a killed process leaves: the
-    /// next process that writes the history adds it. Their content was read.
-    pub unlisted: usize,
-    /// Trace files without a run, which only a killed process leaves: the campaign makes these runs
-    /// again when it is resumed.
-    pub unused: Vec<PathBuf>,
+    /// Segments whose last run was not written completely, which only a killed process leaves: the
+    /// campaign makes this run again when it is resumed.
+    pub unfinished: Vec<PathBuf>,
 }
 
 impl History {
-    /// Examines a history, also a damaged one, without changing it: compares the store's files with
-    /// their checksums, reads the whole store, and compares every trace with its run. Returns the
-    /// result, and the history as far as it can be read.
+    /// Examines a history, also a damaged one, without changing it: reads every frame of every
+    /// file, and compares the values of each run. Returns the result, and the history as far as it
+    /// can be read.
     ///
     /// # Errors
-    /// `H003` or `H004` if this program can't read the history; `H007` if the whole store is
-    /// unreadable.
+    /// `H003` or `H004` if this program can't read the history.
     pub fn examine(dir: &Path) -> Result<(Integrity, Self), Diagnostics> {
-        let folder = Folder::to_read(dir)?;
+        let history = Self::open_to_read(dir)?;
         let mut found = Integrity::default();
-        match Seal::read(&folder) {
-            Found::Whole(seal) => {
-                let reason = "it has changed since it was written";
-                found
-                    .damage
-                    .extend(seal.damage(&folder, u64::MAX, cores()).into_iter().map(|name| of_store(&name, reason)));
-                found.damage.extend(seal.damaged_copies(&folder).into_iter().map(|name| Damage {
-                    file: Path::new("seal").join(name),
-                    run: None,
-                    reason: reason.to_owned(),
-                }));
-                found.unlisted = seal.unlisted(&folder);
-            }
-            Found::Missing => found.unlisted = Seal::default().unlisted(&folder),
-            Found::Damaged => found.damage.push(Damage {
-                file: PathBuf::from("seal/SUMS"),
-                run: None,
-                reason: "the list of checksums is damaged; the next process that writes the history replaces it"
-                    .to_owned(),
-            }),
+        let extent = history.extent()?;
+        for (id, extent) in &extent.campaigns {
+            history.examine_campaign(id, extent, &mut found)?;
         }
-        if journal::read(dir).is_ok_and(|bytes| !journal::statements(&bytes, cores()).1) {
-            let reason = pending::DAMAGED.to_owned();
-            found.damage.push(Damage {
-                file: PathBuf::from(journal::NAME),
-                run: None,
-                reason,
-            });
-        }
-        let history = match Self::open_to_read(dir) {
-            Ok(history) => match scan(&*history.store()?) {
-                Ok(()) => history,
-                Err(error) => salvaged(dir, &error.to_string(), &mut found)?,
-            },
-            Err(faults) => salvaged(dir, &faults.to_string(), &mut found)?,
-        };
-        history.compare_traces(&mut found)?;
-        let lost = match history.tail {
-            Tail::Cut => Some("it ends within a record, and no process writes it"),
-            Tail::Missing if !found.unused.is_empty() => {
-                Some("it is missing, and traces have no run")
-            }
-            Tail::Whole if found.unused.len() > 1 => {
-                Some("its end is missing: several traces have no run")
-            }
-            Tail::Whole | Tail::Missing | Tail::Closed => None,
-        };
-        found.damage.extend(lost.map(|reason| Damage {
-            file: PathBuf::from(journal::NAME),
-            run: None,
-            reason: reason.to_owned(),
-        }));
         found
             .damage
             .sort_by(|one, other| (&one.file, &one.run).cmp(&(&other.file, &other.run)));
-        Ok((found, history))
+        found.damage.dedup_by(|one, other| (&one.file, &one.run) == (&other.file, &other.run));
+        if found.damage.is_empty() {
+            return Ok((found, history));
+        }
+        let (salvaged, _) = Self::open_to_salvage(dir)?;
+        Ok((found, salvaged))
     }
 
-    /// Compares the traces with the runs of the store.
-    fn compare_traces(&self, found: &mut Integrity) -> Result<(), Diagnostics> {
-        let mut runs = self
-            .runs(&RunFilter::default())
-            .or_else(|faults| self.whole_runs().map_err(|_| faults))?;
-        let outlines: BTreeSet<String> = self
-            .outlined_ids(None)
-            .unwrap_or_default()
-            .into_iter()
-            .collect();
-        runs.retain(|run| !outlines.contains(&run.run));
-        found.runs = runs.len();
-        let store = self.store()?;
-        // The fault of the copy of a run's outcomes in its trace file.
-        let fault_of_copy = |id: &str, bytes: &[u8]| match trace_file::after_trace(bytes) {
-            Ok(after) => match (
-                trace_parts::of_bytes(after),
-                detail::parts(&*store, &run_node(id)),
-            ) {
-                (Ok((_, copied)), Ok(stored)) if copied != stored => {
-                    Some("its copy of the outcomes differs from the store".to_owned())
-                }
-                (Err(why), _) => Some(why),
-                // The damage of the store is listed.
-                _ => None,
-            },
-            Err(why) => Some(why),
+    fn examine_campaign(
+        &self,
+        id: &str,
+        extent: &CampaignExtent,
+        found: &mut Integrity,
+    ) -> Result<(), Diagnostics> {
+        let (below, folder) = (self.folder.below(), self.folder.campaign(id));
+        let relative = |file: &Path| self.folder.relative(file).to_path_buf();
+        let state = match CampaignState::read(&below, &folder, id) {
+            Ok(state) => Some(state),
+            Err(why) => {
+                found.damage.push(Damage {
+                    file: relative(&folder.join(SegmentColumn::Campaign.extension())),
+                    run: None,
+                    reason: why.to_string(),
+                });
+                None
+            }
         };
-        let mut known = BTreeSet::new();
-        for run in &runs {
-            let file = self.trace_path(&run.run);
-            let reason = match folder::read(&file) {
-                Ok(bytes) => match trace_file::decode(&bytes) {
-                    Ok((_, trace)) if trace.hash == run.trace_hash => {
-                        fault_of_copy(&run.run, &bytes)
+        let mut runs = CampaignRuns::default();
+        id.clone_into(&mut runs.id);
+        for (number, lengths) in &extent.segments {
+            let file = |column: SegmentColumn| {
+                folder.join(format!("{number:04}.{}", column.extension()))
+            };
+            if let Some(length) = lengths.runs {
+                match Segment::open(&below, &folder, *number, length) {
+                    Ok(segment) => {
+                        if segment.is_torn() {
+                            runs.torn.push(segment.file(SegmentColumn::Runs));
+                        }
+                        runs.segments.push(segment);
                     }
-                    Ok((_, trace)) => Some(format!(
-                        "it is the trace {}, not {}",
-                        trace.hash, run.trace_hash
-                    )),
-                    Err(why) => Some(why),
-                },
-                Err(error) => Some(error.to_string()),
-            };
-            let damage = |reason| Damage {
-                file: relative(self.dir(), &file),
-                run: Some(run.run.clone()),
-                reason,
-            };
-            found.damage.extend(reason.map(damage));
-            known.insert(file);
+                    Err(why) => found.damage.push(Damage {
+                        file: relative(&file(SegmentColumn::Runs)),
+                        run: None,
+                        reason: why.to_string(),
+                    }),
+                }
+            }
+            if let Some(length) = lengths.judgements {
+                match read_judgements(&below, &folder, *number, length) {
+                    Ok((later, batches, is_torn)) => {
+                        runs.later.extend(later);
+                        runs.batches.insert(*number, batches);
+                        if is_torn {
+                            runs.torn.push(file(SegmentColumn::Judgements));
+                        }
+                    }
+                    Err(why) => found.damage.push(Damage {
+                        file: relative(&file(SegmentColumn::Judgements)),
+                        run: None,
+                        reason: why.to_string(),
+                    }),
+                }
+            }
         }
-        let (outlines, damaged) = self.examine_outlines();
-        found.runs += outlines;
-        found
-            .damage
-            .extend(damaged.into_iter().map(|(file, reason)| Damage {
-                file: relative(self.dir(), &file),
+        runs.sort();
+        found.runs += runs.len();
+        for run in runs.iter() {
+            for column in SegmentColumn::OF_RUNS {
+                let reason = examine_run(run, column);
+                found.damage.extend(reason.map(|reason| Damage {
+                    file: relative(&run.segment.file(column)),
+                    run: Some(run_id(id, run.row.index)),
+                    reason,
+                }));
+            }
+        }
+        let recorded = state.as_ref().map(|state| &state.segments);
+        if let Some(file) = recorded.and_then(|recorded| runs.shortened(recorded)) {
+            found.damage.push(Damage {
+                file: relative(&folder.join(file)),
                 run: None,
-                reason,
-            }));
-        let files = self.folder.below().files(&self.folder.traces()).into_iter();
-        found.unused = files
-            .filter(|file| !known.contains(file))
-            .map(|file| relative(self.dir(), &file))
-            .collect();
-        found.unused.sort();
+                reason: "it is shorter than it was".to_owned(),
+            });
+        }
+        let is_locked = self.folder.is_locked();
+        for tail in self.torn_tails(&runs)? {
+            let is_lost = tail.without_row.len() > 1
+                && !is_locked
+                && state.as_ref().is_none_or(|state| state.end.is_none());
+            if is_lost {
+                found.damage.push(Damage {
+                    file: relative(&tail.file),
+                    run: None,
+                    reason: format!(
+                        "its end is missing: {} runs have values, but no row",
+                        tail.without_row.len()
+                    ),
+                });
+            } else {
+                found.unfinished.push(relative(&tail.file));
+            }
+        }
         Ok(())
     }
-}
 
-/// Opens the readable part of a history, and adds its faults.
-fn salvaged(dir: &Path, why: &str, found: &mut Integrity) -> Result<History, Diagnostics> {
-    let is_named = |damage: &Damage| {
-        damage.file.starts_with("store") || damage.file.starts_with(journal::NAME)
-    };
-    if !found.damage.iter().any(is_named) {
-        found.damage.push(Damage {
-            file: PathBuf::from("store"),
-            run: None,
-            reason: why.trim().to_owned(),
-        });
-    }
-    let (history, lost) =
-        History::open_to_salvage(dir).map_err(|_| fault::damaged(dir, why.trim()))?;
-    let reason = "its statements can't be read";
-    found.damage.extend(lost.into_iter().map(|run| Damage {
-        file: PathBuf::from("store"),
-        run: Some(run),
-        reason: reason.to_owned(),
-    }));
-    Ok(history)
-}
-
-fn of_store(name: &str, reason: &str) -> Damage {
-    Damage {
-        file: Path::new("store").join(name),
-        run: None,
-        reason: reason.to_owned(),
+    /// Like [`History::open_to_read`], for a damaged history: reads everything that is readable.
+    /// Returns it with the ids of the runs that are lost, sorted.
+    ///
+    /// # Errors
+    /// As [`History::open_to_read`]; a file can't be read.
+    pub fn open_to_salvage(dir: &Path) -> Result<(Self, Vec<String>), Diagnostics> {
+        let folder = Folder::to_read(dir)?;
+        let extent = folder.extent()?;
+        let (mut campaigns, mut all_lost) = (BTreeMap::new(), Vec::new());
+        for (id, extent) in &extent.campaigns {
+            let (runs, lost) = salvaged(&folder, id, extent)?;
+            let (below, path) = (folder.below(), folder.campaign(id));
+            let state = CampaignState::salvage(&below, &path, id)
+                .map_err(|error| fault::io(dir, "reading a campaign", &error))?;
+            match state {
+                Some(state) => {
+                    all_lost.extend(lost.iter().map(|index| run_id(id, *index)));
+                    campaigns.insert(id.clone(), (Arc::new(state), Arc::new(runs)));
+                }
+                // Runs without their campaign have no rules, models or configuration.
+                None => all_lost.extend(runs.iter().map(|run| run_id(id, run.row.index))),
+            }
+        }
+        all_lost.sort();
+        all_lost.dedup();
+        Ok((Self::of_salvaged(folder, campaigns), all_lost))
     }
 }
 
-fn relative(dir: &Path, file: &Path) -> PathBuf {
-    file.strip_prefix(dir).unwrap_or(file).to_path_buf()
+/// The readable runs of a campaign, and the indices of the others.
+fn salvaged(
+    folder: &Folder,
+    id: &str,
+    extent: &CampaignExtent,
+) -> Result<(CampaignRuns, Vec<u64>), Diagnostics> {
+    let (below, path) = (folder.below(), folder.campaign(id));
+    let unread = |why: ReadFault| fault::segment(folder, &path, &why);
+    let (mut runs, mut all_lost) = (CampaignRuns::default(), Vec::new());
+    id.clone_into(&mut runs.id);
+    for (number, lengths) in &extent.segments {
+        if let Some(segment) = Segment::salvage(&below, &path, *number).map_err(unread)? {
+            let (segment, lost) = segment;
+            all_lost.extend(lost);
+            runs.segments.push(segment);
+        }
+        if lengths.judgements.is_some() {
+            let later = salvage_judgements(&below, &path, *number);
+            let later = later.map_err(|error| unread(error.into()))?;
+            runs.later.extend(later);
+        }
+    }
+    runs.sort();
+    all_lost.retain(|index| runs.find(*index).is_none());
+    Ok((runs, all_lost))
+}
+
+/// The fault of a value of a run, if it has one.
+fn examine_run(run: RunAt<'_>, column: SegmentColumn) -> Option<String> {
+    let RunAt { segment, row } = run;
+    match column {
+        SegmentColumn::Details => match segment.run(row) {
+            Ok(stored) if segment.agrees(row, &stored) => None,
+            Ok(_) => Some("its row has other values".to_owned()),
+            Err(why) => Some(why.to_string()),
+        },
+        SegmentColumn::States => match segment.states(row) {
+            Ok(states) => match decode_head(&states) {
+                Ok((_, trace)) if trace.hash == row.trace_hash() => None,
+                Ok(_) => Some("these are the states of another run".to_owned()),
+                Err(why) => Some(why.to_string()),
+            },
+            Err(why) => Some(why.to_string()),
+        },
+        SegmentColumn::Motion => match (segment.motion(row), segment.states(row)) {
+            (Ok(Some(motion)), Ok(states)) => {
+                let (_, mut trace) = decode_head(&states).ok()?;
+                let fault = decode_motion(motion, &mut trace).err()?;
+                Some(fault.to_string())
+            }
+            (Err(why), _) => Some(why.to_string()),
+            _ => None,
+        },
+        SegmentColumn::Runs | SegmentColumn::Judgements | SegmentColumn::Campaign => None,
+    }
 }

@@ -1,11 +1,10 @@
-//! Runs with their outcomes, one after the other: the lists of a history with a million runs don't
-//! fit in memory.
+//! Runs with their outcomes, one after the other.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::sync::Arc;
 
-use crate::lists::{self, LaterOutcome};
-use crate::outlines::Outlined;
+use crate::campaign::RunAt;
+use crate::segment::LaterJudgement;
 use crate::{History, OutcomeRow, RunFilter, RunRow, SceneDigest};
 use actcheck_base::{Diagnostics, Outcome};
 
@@ -77,125 +76,60 @@ impl JudgedRun {
 }
 
 impl History {
-    /// Calls `each` with the runs that match a filter, sorted by the start of their campaign, then
-    /// by index. Outlines are read a few at a time. Returns the digests of the rules of later
-    /// judgements.
+    /// Calls `each` with the runs that match a filter, in the order of their campaigns, then by
+    /// index. Returns the digests of the rules of later judgements.
     ///
     /// # Errors
-    /// The store can't be read; `H007` a file is damaged; `H026` an id is not an id.
+    /// `H007` a file is damaged; `H026` an id is not an id.
     pub fn each_judged(
         &self,
         filter: &RunFilter,
         wish: Wish,
         each: &mut dyn FnMut(JudgedRun),
     ) -> Result<LaterRules, Diagnostics> {
-        let mut reading = Reading::begin(self, filter, wish)?;
-        let store = self.store_with(lists::of_runs)?;
-        let whole = lists::runs(&store, filter, self.threads())
-            .map_err(|error| self.query_fault(&error))?;
-        self.check_ids(
-            "run",
-            whole.iter().flat_map(|run| [&run.run, &run.campaign]),
-        )?;
-        let mut order = lists::campaign_ids(&store).map_err(|error| self.query_fault(&error))?;
-        order.retain(|id| {
-            filter
-                .campaign
-                .as_ref()
-                .is_none_or(|campaign| campaign == id)
-        });
-        self.check_ids("campaign", &order)?;
-        let known: HashSet<String> = order.iter().cloned().collect();
-        let scenes = if wish.scenes {
-            self.whole_scenes(&whole)?
-        } else {
-            BTreeMap::new()
-        };
-        let mut of_campaign: HashMap<String, Vec<RunRow>> = HashMap::new();
-        for row in whole {
-            // A campaign without a start has no place in the order.
-            if known.contains(&row.campaign) {
-                of_campaign
-                    .entry(row.campaign.clone())
-                    .or_default()
-                    .push(row);
-            } else {
-                each(reading.whole(row, &scenes)?);
+        let ids: Vec<String> = match &filter.campaign {
+            Some(id) => vec![id.clone()],
+            None => {
+                let states = self.campaign_states()?;
+                states.iter().map(|state| state.record.id.clone()).collect()
             }
-        }
-        let mut fault = Ok(());
-        for campaign in &order {
-            let mut whole = of_campaign
-                .remove(campaign)
-                .unwrap_or_default()
-                .into_iter()
-                .peekable();
-            let of_campaign = RunFilter {
-                campaign: Some(campaign.clone()),
-                ..filter.clone()
-            };
-            self.each_outlined(&of_campaign, &mut |outlined| {
-                let mut pass = || -> Result<(), Diagnostics> {
-                    while let Some(row) = whole.next_if(|row| row.index <= outlined.row.index) {
-                        each(reading.whole(row, &scenes)?);
-                    }
-                    each(reading.outlined(&outlined)?);
-                    Ok(())
+        };
+        let mut reading = Reading {
+            wish,
+            texts: HashSet::new(),
+            rules: LaterRules::new(),
+        };
+        for id in ids {
+            let runs = self.runs_of(&id)?;
+            for run in runs.iter().filter(|run| run.matches(filter)) {
+                let later = match wish.judgements {
+                    Judgements::Newest => newest(runs.later_of(run.row.index)),
+                    Judgements::None | Judgements::Campaign => Vec::new(),
                 };
-                if fault.is_ok() {
-                    fault = pass();
-                }
-            })?;
-            fault?;
-            fault = Ok(());
-            for row in whole {
-                each(reading.whole(row, &scenes)?);
+                each(reading.run(&id, run, &later));
             }
         }
         Ok(reading.rules)
     }
 }
 
+/// The last judgement of each property and action, which supersedes the others.
+pub(crate) fn newest(mut later: Vec<&LaterJudgement>) -> Vec<&LaterJudgement> {
+    let mut seen = HashSet::new();
+    later.reverse();
+    later.retain(|later| seen.insert((later.step, later.judgement.property.as_str())));
+    later.reverse();
+    later
+}
+
 /// The state of one reading.
-struct Reading<'h> {
-    history: &'h History,
+struct Reading {
     wish: Wish,
     texts: HashSet<Arc<str>>,
-    /// Outcomes of runs that are kept whole, by run.
-    whole: HashMap<String, Vec<OutcomeRow>>,
-    /// Later judgements by run.
-    later: HashMap<String, Vec<LaterOutcome>>,
     rules: LaterRules,
 }
 
-impl<'h> Reading<'h> {
-    fn begin(history: &'h History, filter: &RunFilter, wish: Wish) -> Result<Self, Diagnostics> {
-        let mut whole: HashMap<String, Vec<OutcomeRow>> = HashMap::new();
-        let mut later: HashMap<String, Vec<LaterOutcome>> = HashMap::new();
-        if wish.judgements != Judgements::None {
-            let store = history.store_with(lists::of_outcomes)?;
-            for row in
-                lists::outcomes(&store, filter).map_err(|error| history.query_fault(&error))?
-            {
-                whole.entry(row.run.clone()).or_default().push(row);
-            }
-        }
-        if wish.judgements == Judgements::Newest {
-            let store = history.store_with(lists::of_rechecked)?;
-            for outcome in lists::rechecked(&store).map_err(|error| history.query_fault(&error))? {
-                later.entry(outcome.run.clone()).or_default().push(outcome);
-            }
-        }
-        Ok(Self {
-            history,
-            wish,
-            texts: HashSet::new(),
-            whole,
-            later,
-            rules: LaterRules::new(),
-        })
-    }
-
+impl Reading {
     fn text(&mut self, text: &str) -> Arc<str> {
         if let Some(known) = self.texts.get(text) {
             return Arc::clone(known);
@@ -205,100 +139,63 @@ impl<'h> Reading<'h> {
         new
     }
 
-    fn whole(
-        &mut self,
-        row: RunRow,
-        scenes: &BTreeMap<String, SceneDigest>,
-    ) -> Result<JudgedRun, Diagnostics> {
-        let own = self.whole.remove(&row.run).unwrap_or_default();
-        let outcomes = own.into_iter().map(|own| JudgedOutcome {
-            step: own.step,
-            action: self.text(&own.action),
-            property: self.text(&own.property),
-            outcome: own.outcome,
-            margin: own.margin,
-        });
-        let mut outcomes: Vec<JudgedOutcome> = outcomes.collect();
-        let scene = scenes.get(&row.run).cloned();
-        self.add_later(&row.run, &mut outcomes)?;
-        Ok(JudgedRun {
-            row,
-            scene,
-            outcomes,
-        })
-    }
-
-    fn outlined(&mut self, outlined: &Outlined<'_>) -> Result<JudgedRun, Diagnostics> {
-        let row = outlined.as_run();
+    fn run(&mut self, campaign: &str, run: RunAt<'_>, later: &[&LaterJudgement]) -> JudgedRun {
         let mut outcomes = Vec::new();
         if self.wish.judgements != Judgements::None {
-            for (step, [action, property], outcome, margin) in outlined.outcomes() {
-                let (action, property) = (self.text(action), self.text(property));
+            for own in &run.row.outcomes {
+                let action = self.action(run, own.action);
                 outcomes.push(JudgedOutcome {
-                    step,
+                    step: own.action + 1,
                     action,
-                    property,
-                    outcome,
-                    margin,
+                    property: self.text(&run.segment.text(own.property)),
+                    outcome: own.outcome,
+                    margin: own.margin,
                 });
             }
-            sort(&mut outcomes);
-            self.add_later(&row.run, &mut outcomes)?;
+            for later in later {
+                self.add_later(run, later, &mut outcomes);
+            }
+            outcomes.sort_by(|a, b| (a.step, &a.property).cmp(&(b.step, &b.property)));
         }
-        let scene = self.wish.scenes.then(|| outlined.row.scene.clone());
-        Ok(JudgedRun {
-            row,
-            scene,
+        JudgedRun {
+            row: run.as_run(campaign),
+            scene: self.wish.scenes.then(|| run.row.scene()),
             outcomes,
-        })
+        }
     }
 
-    /// Replaces outcomes by later ones.
+    /// The IRI of an action by its position, from 0; empty if the run broke before it was known.
+    fn action(&mut self, run: RunAt<'_>, position: u32) -> Arc<str> {
+        let number = run.row.actions.get(position as usize).copied().flatten();
+        let text = number.map(|number| run.segment.text(number));
+        self.text(text.as_deref().unwrap_or_default())
+    }
+
+    /// Replaces an outcome by a later one, or adds it.
     fn add_later(
         &mut self,
-        run: &str,
+        run: RunAt<'_>,
+        later: &LaterJudgement,
         outcomes: &mut Vec<JudgedOutcome>,
-    ) -> Result<(), Diagnostics> {
-        let Some(later) = self.later.remove(run) else {
-            return Ok(());
+    ) {
+        let judgement = &later.judgement;
+        self.rules
+            .entry(judgement.property.clone())
+            .or_default()
+            .insert(judgement.rule_digest.clone());
+        let new = JudgedOutcome {
+            step: later.step,
+            action: self.action(run, later.step.saturating_sub(1)),
+            property: self.text(&judgement.property),
+            outcome: judgement.outcome,
+            margin: judgement.margin,
         };
-        for later in later {
-            let of_step = outcomes
-                .iter()
-                .find(|own| own.step == later.step)
-                .map(|own| Arc::clone(&own.action));
-            let action = match of_step {
-                Some(action) => action,
-                None => {
-                    let actions = self.history.run(run)?.actions;
-                    let of_step = actions.into_iter().find(|action| action.step == later.step);
-                    self.text(&of_step.map_or_else(String::new, |action| action.action))
-                }
-            };
-            self.rules
-                .entry(later.property.clone())
-                .or_default()
-                .insert(later.rule);
-            let new = JudgedOutcome {
-                step: later.step,
-                action,
-                property: self.text(&later.property),
-                outcome: later.outcome,
-                margin: later.margin,
-            };
-            match outcomes
-                .iter_mut()
-                .find(|own| own.step == new.step && own.property == new.property)
-            {
-                Some(own) => *own = new,
-                None => outcomes.push(new),
-            }
+        match outcomes
+            .iter_mut()
+            .find(|own| own.step == new.step && own.property == new.property)
+        {
+            Some(own) => *own = new,
+            None => outcomes.push(new),
         }
-        sort(outcomes);
-        Ok(())
     }
-}
-
-fn sort(outcomes: &mut [JudgedOutcome]) {
-    outcomes.sort_by(|a, b| (a.step, &a.property).cmp(&(b.step, &b.property)));
 }

@@ -1,8 +1,6 @@
 //! The newest outcomes.
 
-use std::collections::BTreeSet;
-
-use crate::{History, Judgements, LaterRules, OutcomeRow, RunFilter, Wish, lists};
+use crate::{History, Judgements, LaterRules, OutcomeRow, RunFilter, Wish};
 use actcheck_base::Diagnostics;
 
 /// The newest outcomes of runs: later judgements where they exist, otherwise those of the campaign
@@ -19,7 +17,7 @@ impl History {
     /// Returns the newest outcomes of the runs that match a filter.
     ///
     /// # Errors
-    /// The store can't be read.
+    /// A file is damaged or can't be read.
     pub fn newest_outcomes(&self, filter: &RunFilter) -> Result<NewestOutcomes, Diagnostics> {
         let mut rows = Vec::new();
         let wish = Wish {
@@ -28,16 +26,5 @@ impl History {
         };
         let rules = self.each_judged(filter, wish, &mut |run| rows.extend(run.outcome_rows()))?;
         Ok(NewestOutcomes { rows, rules })
-    }
-
-    /// Returns the ids of the campaigns whose scenes were selected because they fail: those that
-    /// hold a shrunk run, those that ran the failed runs of another campaign again, and cases.
-    /// Statistics leave them out.
-    ///
-    /// # Errors
-    /// The store can't be read.
-    pub fn selected_campaigns(&self) -> Result<BTreeSet<String>, Diagnostics> {
-        lists::selected_campaigns(&*self.store_with(lists::of_selected_campaigns)?)
-            .map_err(|error| self.query_fault(&error))
     }
 }

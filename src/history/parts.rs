@@ -1,17 +1,14 @@
 //! The history in parts, for other stores: a campaign or a run at a time, without blank nodes.
 
-use std::collections::BTreeSet;
-
 use oxigraph::model::{GraphName, NamedNode, NamedOrBlankNode, Quad, Term};
 
-use crate::merge::about;
-use crate::read::{short_id, subjects, text_of};
-use crate::statements::iri;
-use crate::write_campaign::campaign_node;
+use crate::history::run_id;
+use crate::statements::Statements;
+use crate::view::{Demand, Source, WithFacts};
+use crate::write_campaign::{self, campaign_node};
 use crate::write_run::run_node;
-use crate::{History, graphs, trace_file};
+use crate::History;
 use actcheck_base::{Diagnostics, names};
-use actcheck_facts::{extract, extract_complete};
 
 /// The statements about one campaign or run.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -38,48 +35,28 @@ impl History {
         complete: bool,
         each: &mut dyn FnMut(HistoryPart) -> Result<(), Diagnostics>,
     ) -> Result<(), Diagnostics> {
-        let store = self.store()?;
-        let fault = |error| self.fault("reading it", &error);
-        for campaign in self.ids("act:Campaign")? {
-            let node = campaign_node(&campaign);
-            each(part(&node, true, about(&store, &node).map_err(fault)?))?;
+        let demand = Demand::all();
+        let facts = if complete {
+            WithFacts::Complete
+        } else {
+            WithFacts::Lean
+        };
+        let states = self.campaign_states()?;
+        for state in &states {
+            let mut statements = Statements::new(&demand);
+            write_campaign::write(state, &mut statements);
+            let node = campaign_node(&state.record.id);
+            each(part(&node, true, statements.quads))?;
         }
-        let class = iri("act:Run");
-        let whole = subjects(&*store, "rdf:type", class.as_ref()).map_err(fault)?;
-        let whole: BTreeSet<String> = whole
-            .into_iter()
-            .map(|node| short_id(&text_of(&node.into())).to_owned())
-            .collect();
-        self.check_ids("run", &whole)?;
-        for run in &whole {
-            let node = run_node(run);
-            let mut quads = about(&store, &node).map_err(fault)?;
-            if complete {
-                quads.retain(|quad| !graphs::holds_facts(quad.graph_name.as_ref()));
-                quads.extend(graphs::complete(
-                    &extract_complete(&self.states(run)?),
-                    &node,
-                ));
+        for state in &states {
+            let runs = self.runs_of(&state.record.id)?;
+            let source = Source::new(self, &runs.id);
+            for run in runs.iter() {
+                let later = runs.later_of(run.row.index);
+                let quads = source.statements(run, &later, &demand, facts)?.quads;
+                let node = run_node(&run_id(&runs.id, run.row.index));
+                each(part(&node, false, quads))?;
             }
-            each(part(&node, false, quads))?;
-        }
-        for run in self.outline_ids()? {
-            let (node, Some(outline)) = (run_node(&run), self.outline(&run)?) else {
-                continue;
-            };
-            let mut quads = outline.quads;
-            quads.extend(self.later_about_outline(&run, &store)?);
-            if complete {
-                quads.extend(graphs::complete(
-                    &extract_complete(&self.states(&run)?),
-                    &node,
-                ));
-            } else {
-                let (_, trace) = trace_file::decode_head(&outline.head)
-                    .map_err(|why| crate::fault::damaged(self.dir(), &why))?;
-                graphs::write(&extract(&trace), &node, &mut quads);
-            }
-            each(part(&node, false, quads))?;
         }
         Ok(())
     }
@@ -89,7 +66,12 @@ impl History {
     /// # Errors
     /// The history can't be read.
     pub fn parts(&self) -> Result<usize, Diagnostics> {
-        Ok(self.ids("act:Campaign")?.len() + self.ids("act:Run")?.len())
+        let ids = self.campaign_ids()?;
+        let mut count = ids.len();
+        for id in &ids {
+            count += self.runs_of(id)?.len();
+        }
+        Ok(count)
     }
 }
 

@@ -1,25 +1,18 @@
 //! SPARQL queries of users: prefixes are predefined, faults have their place, updates are refused.
 
-use std::collections::BTreeMap;
-use std::ops::Range;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use oxigraph::model::{Literal, NamedNode, Term as StoreTerm};
 use oxigraph::sparql::{
     PreparedSparqlQuery, QueryEvaluationError, QueryResults, SparqlEvaluator, SparqlSyntaxError,
 };
 
-use crate::columns::by_columns;
-use crate::counted::counted_runs;
 use crate::evaluation::{Unfinished, evaluate};
-use crate::fault;
-use crate::light::parser;
-use crate::open::OpenStore;
-use crate::outlined;
 use crate::syntax_fault::syntax_fault;
 use crate::terms::{from_store, to_store};
-use crate::wanted::Wanted;
+use crate::view::Demand;
 use crate::{Cancel, History, QueryAnswer};
 use actcheck_base::{
     COUNTED_TEXT, Diagnostic, Diagnostics, MOST_NESTED_CALLS, Source, Span, TEXT_FUNCTIONS, Term,
@@ -41,10 +34,6 @@ const LONGEST_TEXT: usize = 32 << 20;
 const MOST_KNOWN: usize = 256;
 const LONGEST_KNOWN: usize = 512;
 
-/// Sizes of stores whose columns are joined. In smaller ones it does not matter; in larger ones the
-/// columns may not fit in memory. Unit: bytes.
-pub(super) const COLUMNS: Range<u64> = 16 << 20..1 << 30;
-
 /// Answers a query.
 pub(super) fn answer(
     history: &History,
@@ -53,29 +42,26 @@ pub(super) fn answer(
 ) -> Result<QueryAnswer, Diagnostics> {
     refuse_update(text)?;
     refuse_excess(text)?;
-    if history.shelf().exists()
-        && let Some(answer) = outlined::answer(history, text, cancel)?
-    {
-        return Ok(answer);
-    }
-    let store = history.store_for_query(|| Wanted::query(&text.text))?;
-    let query = prepare(text, &store, cancel)?;
+    let query = prepare(history, text, cancel)?;
+    let dataset = history.dataset(Demand::query(&text.text))?;
     let prepared = query.prepared.clone();
-    let evaluated = evaluate(&store, cancel, move |store| {
-        prepared.on_store(store).execute().and_then(collect)
+    let evaluated = evaluate(dataset, cancel, move |dataset| {
+        prepared
+            .on_queryable_dataset(dataset)
+            .execute()
+            .and_then(collect)
     });
     query.check_texts(text)?;
-    evaluated.map_err(|fault| unfinished(history, text, fault))
+    evaluated.map_err(|fault| unfinished(text, fault))
 }
 
-pub(super) fn unfinished(history: &History, text: &Source, fault: Unfinished) -> Diagnostics {
+fn unfinished(text: &Source, fault: Unfinished) -> Diagnostics {
     match fault {
         Unfinished::Stopped => stopped(text).into(),
         Unfinished::Failed(error) => evaluation_fault(text, &error).into(),
         Unfinished::Crashed => Diagnostic::error("H012", "the query made the evaluator crash")
             .in_source(text)
             .into(),
-        Unfinished::Damaged(error) => fault::damaged(history.dir(), &error.to_string()),
     }
 }
 
@@ -101,36 +87,32 @@ impl Prepared {
 /// Parses a query that [`refuse_excess`] accepts.
 ///
 /// # Errors
-/// Syntax errors.
+/// Syntax errors; the runs that count can't be read.
 pub(super) fn prepare(
+    history: &History,
     text: &Source,
-    store: &OpenStore,
     cancel: &Cancel,
 ) -> Result<Prepared, Diagnostics> {
     let syntax = |error: SparqlSyntaxError| syntax_fault(text, &error.to_string());
-    drop(
-        query_evaluator(store, cancel)
-            .parse_query(&*text.text)
-            .map_err(syntax)?,
-    );
-    // Places in the text that is evaluated differ from the original's, so errors were reported
+    // Places in the text that is evaluated differ from the original's, so errors are reported
     // before.
-    let made = Arc::new(AtomicUsize::new(0));
-    let bounded = with_text_functions(query_evaluator(store, cancel), cancel, &made);
-    let bounded_text = bounded_texts(&text.text);
-    let prepared = match store.size() {
-        Some(size) if COLUMNS.contains(&size) => {
-            let query = parser().parse_query(&bounded_text).map_err(syntax)?;
-            bounded.for_query(by_columns(query))
-        }
-        _ => bounded.parse_query(&bounded_text).map_err(syntax)?,
+    drop(evaluator(cancel).parse_query(&*text.text).map_err(syntax)?);
+    let counted = if text.text.contains("counts") {
+        history.counted_runs()?
+    } else {
+        BTreeSet::new()
     };
+    let made = Arc::new(AtomicUsize::new(0));
+    let evaluator = with_counts(evaluator(cancel), counted);
+    let prepared = with_text_functions(evaluator, cancel, &made)
+        .parse_query(&bounded_texts(&text.text))
+        .map_err(syntax)?;
     Ok(Prepared { prepared, made })
 }
 
 /// Adds functions that make texts of limited length: the evaluator keeps them until the query ends.
 /// Beyond the limit, they stop the query. `made`: their length so far, in bytes.
-pub(super) fn with_text_functions(
+fn with_text_functions(
     evaluator: SparqlEvaluator,
     cancel: &Cancel,
     made: &Arc<AtomicUsize>,
@@ -227,13 +209,8 @@ fn stopped(text: &Source) -> Diagnostic {
     Diagnostic::error("H013", "the query was stopped before it ended").in_source(text)
 }
 
-/// The evaluator of users' queries: [`evaluator`] with the function `act:counts`.
-pub(super) fn query_evaluator(store: &OpenStore, cancel: &Cancel) -> SparqlEvaluator {
-    with_counts(evaluator(cancel), store.clone())
-}
-
 /// An evaluator with the predefined prefixes that can be stopped.
-pub(super) fn evaluator(cancel: &Cancel) -> SparqlEvaluator {
+fn evaluator(cancel: &Cancel) -> SparqlEvaluator {
     let mut evaluator = SparqlEvaluator::new().with_cancellation_token(cancel.token());
     for (prefix, namespace) in names::PREFIXES {
         // Our namespaces are valid IRIs, so none is omitted.
@@ -246,30 +223,21 @@ pub(super) fn evaluator(cancel: &Cancel) -> SparqlEvaluator {
 }
 
 /// Adds the function `act:counts(?run)`: whether the run counts in rates over all campaigns, see
-/// [`History::counted_runs`](crate::History::counted_runs). The runs are read when a query first
-/// calls it.
-fn with_counts(evaluator: SparqlEvaluator, store: OpenStore) -> SparqlEvaluator {
-    let counted = OnceLock::new();
+/// [`History::counted_runs`].
+fn with_counts(evaluator: SparqlEvaluator, counted: BTreeSet<String>) -> SparqlEvaluator {
     evaluator.with_custom_function(
         NamedNode::new_unchecked(names::act("counts")),
         move |args: &[StoreTerm]| {
             let [StoreTerm::NamedNode(run)] = args else {
                 return None;
             };
-            let counted = counted.get_or_init(|| counted_runs(&store).ok());
-            Some(
-                Literal::from(
-                    counted
-                        .as_ref()?
-                        .contains(run.as_str().strip_prefix(names::RUN)?),
-                )
-                .into(),
-            )
+            let id = run.as_str().strip_prefix(names::RUN)?;
+            Some(Literal::from(counted.contains(id)).into())
         },
     )
 }
 
-pub(super) fn collect(results: QueryResults<'_>) -> Result<QueryAnswer, QueryEvaluationError> {
+fn collect(results: QueryResults<'_>) -> Result<QueryAnswer, QueryEvaluationError> {
     Ok(match results {
         QueryResults::Boolean(value) => QueryAnswer::Boolean(value),
         QueryResults::Solutions(solutions) => {

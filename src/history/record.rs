@@ -8,7 +8,7 @@ use actcheck_base::{Diagnostic, Judgement, Outcome, RunFacts, Shard};
 use actcheck_data::{Choice, Quality, Scene, Trace};
 
 /// A campaign, written before its first run.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CampaignRecord {
     /// Short id, such as `k7f3`; unique in its history.
     pub id: String,
@@ -58,7 +58,7 @@ pub struct CampaignRecord {
 }
 
 /// A warning about the ontology or the rules of a campaign.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct FindingRecord {
     /// Its code, such as `R046`.
     pub code: String,
@@ -80,7 +80,7 @@ impl FindingRecord {
 }
 
 /// A program that performs actions, as recorded with a campaign.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SkillRecord {
     /// Its command with its arguments, as the user wrote them.
     pub command: String,
@@ -125,7 +125,7 @@ impl RunStatus {
 }
 
 /// The end of a campaign, with its results.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct CampaignEnd {
     /// RFC 3339.
     pub ended: String,
@@ -152,7 +152,7 @@ pub struct Repetition {
     pub number: u64,
 }
 
-/// One run, complete: written in one transaction.
+/// One run, complete.
 #[derive(Debug, Clone)]
 pub struct RunRecord {
     /// `CAMPAIGN-NUMBER`, such as `k7f3-3`. The number is the index + 1.

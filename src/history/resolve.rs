@@ -1,6 +1,5 @@
 //! Names of runs as people type them.
 
-use crate::read::short_id;
 use crate::{History, Judgements, RunFilter, Wish};
 use actcheck_base::{Diagnostic, Diagnostics, Outcome, names, nearest};
 
@@ -8,6 +7,14 @@ use actcheck_base::{Diagnostic, Diagnostics, Outcome, names, nearest};
 const LAST: &str = "@last";
 /// Name of the last run in which a property failed.
 const LAST_FAILED: &str = "@last-failed";
+
+/// The id in one of our IRIs; other texts are returned unchanged.
+fn short_id(iri: &str) -> &str {
+    [names::RUN, names::CAMPAIGN, names::OBJ]
+        .iter()
+        .find_map(|namespace| iri.strip_prefix(namespace))
+        .unwrap_or(iri)
+}
 
 impl History {
     /// Returns the id of a run, given its id, its IRI, `run:ID`, a unique prefix, or `@last` for
@@ -24,7 +31,7 @@ impl History {
         if names::is_id(name) && self.has_run(name)? {
             return Ok(name.to_owned());
         }
-        let known = self.ids("act:Run")?;
+        let known = self.all_run_ids()?;
         let beginning: Vec<&String> = known
             .iter()
             .filter(|id| !name.is_empty() && id.starts_with(name))

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::campaign_state::CampaignState;
 use crate::{Repetition, RunStatus, SkillRecord};
 use actcheck_base::{Judgement, Outcome};
 use actcheck_data::Role;
@@ -80,6 +81,30 @@ pub struct CampaignRow {
     pub ontology_digest: String,
     /// The program that performed actions; `None` if the reference skills performed all.
     pub skill: Option<SkillRecord>,
+}
+
+impl CampaignRow {
+    pub(crate) fn of(state: &CampaignState, runs: u64) -> Self {
+        let (record, end) = (&state.record, state.end.as_ref());
+        Self {
+            id: record.id.clone(),
+            name: record.name.clone(),
+            started: record.started.clone(),
+            ended: end.map(|end| end.ended.clone()),
+            ended_by: end.and_then(|end| end.ended_by.clone()),
+            interrupted: end.is_none_or(|end| end.interrupted),
+            seed: record.seed,
+            planned_runs: record.planned_runs,
+            runs,
+            score: end.and_then(|end| end.score),
+            score_without_broken: end.and_then(|end| end.score_without_broken),
+            outcomes: end.map(|end| end.outcomes.clone()).unwrap_or_default(),
+            program_version: record.program_version.clone(),
+            config_digest: record.config_digest.clone(),
+            ontology_digest: record.ontology_digest.clone(),
+            skill: record.skill.clone(),
+        }
+    }
 }
 
 /// Outcome of one property in one action execution.

@@ -1,18 +1,10 @@
 //! Digests of scenes, which show whether two runs had the same scene.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use oxigraph::model::NamedNode;
-use oxigraph::store::StorageError;
-
-use crate::detail::{designators, objects};
-use crate::quad_source::QuadSource;
-use crate::read::Node;
-use crate::wanted::Wanted;
-use crate::write_run::run_node;
-use crate::{History, ObjectDetail, RunFilter, RunRow};
+use crate::{History, ObjectDetail, RunRow};
 use actcheck_base::{Diagnostics, Digest};
 
 /// The scene of a run, in two digests.
@@ -29,57 +21,17 @@ impl History {
     /// Returns the scenes of runs by run id.
     ///
     /// # Errors
-    /// The store can't be read.
+    /// A file is damaged or can't be read.
     pub fn scenes(&self, runs: &[RunRow]) -> Result<BTreeMap<String, SceneDigest>, Diagnostics> {
-        let mut outlines = BTreeMap::new();
-        self.each_outlined(&RunFilter::default(), &mut |outlined| {
-            outlines.insert(outlined.run(), outlined.row.scene.clone());
-        })?;
-        let wanted: BTreeSet<&String> = runs.iter().map(|row| &row.run).collect();
-        outlines.retain(|run, _| wanted.contains(run));
-        let whole: Vec<RunRow> = runs
-            .iter()
-            .filter(|row| !outlines.contains_key(&row.run))
-            .cloned()
-            .collect();
-        outlines.extend(self.whole_scenes(&whole)?);
-        Ok(outlines)
+        let mut scenes = BTreeMap::new();
+        for row in runs {
+            let of_campaign = self.runs_of(&row.campaign)?;
+            if let Some(run) = of_campaign.find(row.index) {
+                scenes.insert(row.run.clone(), run.row.scene());
+            }
+        }
+        Ok(scenes)
     }
-
-    /// Returns the scenes of runs that are kept whole, by run id.
-    ///
-    /// # Errors
-    /// The store can't be read.
-    pub(super) fn whole_scenes(
-        &self,
-        runs: &[RunRow],
-    ) -> Result<BTreeMap<String, SceneDigest>, Diagnostics> {
-        let store = self.store_with(Wanted::details)?;
-        let scene = |row: &RunRow| {
-            let digest = read(&*store, &run_node(&row.run))
-                .map_err(|error| self.fault("reading scenes", &error))?;
-            Ok((row.run.clone(), digest))
-        };
-        runs.iter().map(scene).collect()
-    }
-}
-
-/// Reads the scene of a run.
-///
-/// # Errors
-/// The store can't be read.
-pub(super) fn read(store: &impl QuadSource, run: &NamedNode) -> Result<SceneDigest, StorageError> {
-    let node = Node::read(store, run)?;
-    let whole = [
-        "act:test",
-        "act:worldName",
-        "w:baseX",
-        "w:baseY",
-        "w:baseYaw",
-    ]
-    .map(|property| node.text(property).unwrap_or_default());
-    let objects = objects(store, run)?;
-    Ok(SceneDigest::of(&whole, &designators(&node), &objects))
 }
 
 impl SceneDigest {

@@ -7,9 +7,9 @@ use oxigraph::model::Literal;
 use serde::{Deserialize, Serialize};
 
 use crate::write_scene::noise;
-use crate::{ActionDetail, ObjectDetail, Repetition, RunRecord, RunStatus, SceneDigest};
-#[cfg(test)]
-use crate::{RunDetail, RunRow};
+use crate::{
+    ActionDetail, ObjectDetail, Repetition, RunDetail, RunRecord, RunRow, RunStatus, SceneDigest,
+};
 use actcheck_base::Judgement;
 use actcheck_data::{ActionEnd, ActionTrace, Quality, Role, SceneObject};
 
@@ -154,8 +154,6 @@ impl StoredRun {
     }
 }
 
-// The next form of the history reads these, which is not used yet.
-#[cfg(test)]
 impl StoredRun {
     /// The run as in a list.
     pub(crate) fn row(&self, campaign: &str) -> RunRow {
@@ -330,23 +328,7 @@ fn message(action: &ActionTrace) -> Option<&str> {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::quad_source::RunQuads;
-    use crate::write_run::{quads_without_facts, run_node};
-    use crate::{detail, scene_digest};
     use actcheck_base::Outcome;
-
-    /// The values of a run are those that its statements give.
-    #[test]
-    fn details_are_the_same_as_from_statements() {
-        for index in 0..5 {
-            let (stored, run) = (sample(index), run_node(&sample(index).id_in("k")));
-            let quads = RunQuads::new(quads_without_facts(&stored, "k"));
-            let detail = detail::read(&quads, &run).expect("it is in memory");
-            assert_eq!(stored.detail("k"), detail);
-            let digest = scene_digest::read(&quads, &run).expect("it is in memory");
-            assert_eq!(stored.scene_digest(), digest);
-        }
-    }
 
     /// A run of a campaign of picks: every third one fails.
     pub(crate) fn sample(index: u64) -> StoredRun {

@@ -1,15 +1,9 @@
 //! Values of a run that show the health of its campaign.
 
-use std::collections::HashMap;
-
-use oxigraph::model::{GraphNameRef, NamedOrBlankNode, Quad};
-use oxigraph::store::{StorageError, Store};
-
-use crate::read::{Node, text_of};
-use crate::statements::iri;
-use crate::wanted::Wanted;
-use crate::write_run::run_node;
-use crate::{RunRow, detail};
+use crate::history::run_id;
+use crate::segment::SegmentColumn;
+use crate::{History, RunRow};
+use actcheck_base::Diagnostics;
 use actcheck_data::Choice;
 
 /// The values of one run.
@@ -36,83 +30,57 @@ pub struct RunVitals {
     pub energy_gain_j: Option<f64>,
 }
 
-/// Values of many runs, read by property: a store finds all values of one property at once, which
-/// takes a tenth of the time of all properties of each run.
-pub(super) struct Columns {
-    discards: HashMap<String, f64>,
-    wall_secs: HashMap<String, f64>,
-    deepest_penetration_m: HashMap<String, f64>,
-    energy_gain_j: HashMap<String, f64>,
-}
-
-/// The statements that [`Columns`] reads.
-pub(super) fn wanted() -> Wanted {
-    let columns = [
-        "act:discards",
-        "act:wallSeconds",
-        "act:deepestPenetration",
-        "act:energyGain",
-    ];
-    let discards = ["act:ofRun", "act:attempt", "act:reason"];
-    let mut wanted = Wanted::values(&[&columns[..], &discards[..]].concat());
-    wanted.add(Wanted::individuals("act:Discard"));
-    wanted
-}
-
-impl Columns {
-    /// Reads the values of all runs of a store.
-    pub(super) fn read(store: &Store) -> Result<Self, StorageError> {
-        Ok(Self {
-            discards: column(store, "act:discards")?,
-            wall_secs: column(store, "act:wallSeconds")?,
-            deepest_penetration_m: column(store, "act:deepestPenetration")?,
-            energy_gain_j: column(store, "act:energyGain")?,
-        })
-    }
-
-    /// The values of one run. The caller reads its choices from its trace file.
-    pub(super) fn of(
+impl History {
+    /// Calls `each` with the health data of every run of a campaign, by index.
+    ///
+    /// # Errors
+    /// `H014` there is no such campaign; otherwise as [`History::trace`].
+    pub fn each_vitals(
         &self,
-        store: &Store,
-        row: &RunRow,
-        choices: Vec<Choice>,
-    ) -> Result<RunVitals, StorageError> {
-        let node = run_node(&row.run);
-        let value = |column: &HashMap<String, f64>| column.get(node.as_str()).copied();
-        let discards = match value(&self.discards) {
-            Some(count) if count > 0.0 => {
-                detail::discards(store, &node, &Node::read(store, &node)?)?
-            }
-            _ => Vec::new(),
-        };
-        Ok(RunVitals {
-            run: row.run.clone(),
-            index: row.index,
-            choices,
-            discards,
-            is_weighted: row.weight.is_some(),
-            repetition: row.repetition.map_or(0, |repetition| repetition.number),
-            wall_secs: value(&self.wall_secs).unwrap_or_default(),
-            deepest_penetration_m: value(&self.deepest_penetration_m),
-            energy_gain_j: value(&self.energy_gain_j),
-        })
+        campaign: &str,
+        mut each: impl FnMut(&RunVitals),
+    ) -> Result<(), Diagnostics> {
+        self.campaign(campaign)?;
+        let runs = self.runs_of(campaign)?;
+        for run in runs.iter() {
+            let id = run_id(campaign, run.row.index);
+            let unread = |why| self.unread(&id, run, SegmentColumn::States, &why);
+            let states = run.segment.states(run.row);
+            let choices = self.choices_in(&id, run, &states.map_err(unread)?)?;
+            let discards = match run.row.discards {
+                0 => Vec::new(),
+                _ => self.run(&id)?.discards,
+            };
+            each(&RunVitals {
+                index: run.row.index,
+                choices,
+                discards,
+                is_weighted: run.row.weight.is_some(),
+                repetition: run.row.repetition.map_or(0, |repetition| repetition.number),
+                wall_secs: run.row.wall_secs,
+                deepest_penetration_m: run.row.quality.map(|own| own.deepest_penetration_m),
+                energy_gain_j: run.row.quality.map(|own| own.energy_gain_j),
+                run: id,
+            });
+        }
+        Ok(())
     }
-}
 
-/// The numbers that subjects have as values of a property, by IRI.
-fn column(store: &Store, property: &str) -> Result<HashMap<String, f64>, StorageError> {
-    let property = iri(property);
-    let quads = store.quads_for_pattern(
-        None,
-        Some(property.as_ref()),
-        None,
-        Some(GraphNameRef::DefaultGraph),
-    );
-    let value = |quad: Quad| match (quad.subject, text_of(&quad.object).parse::<f64>()) {
-        (NamedOrBlankNode::NamedNode(node), Ok(value)) => Some((node.into_string(), value)),
-        _ => None,
-    };
-    quads
-        .filter_map(|quad| quad.map(value).transpose())
-        .collect()
+    /// Number of runs whose motion is not kept, and the wall time that they took together. Unit:
+    /// seconds.
+    ///
+    /// # Errors
+    /// A file is damaged or can't be read.
+    pub fn cost_of_motion(&self, runs: &[RunRow]) -> Result<(usize, f64), Diagnostics> {
+        let (mut count, mut secs) = (0, 0.0);
+        for row in runs {
+            let of_campaign = self.runs_of(&row.campaign)?;
+            let run = of_campaign.find(row.index).filter(|run| !run.row.is_whole());
+            if let Some(run) = run {
+                count += 1;
+                secs += run.row.wall_secs;
+            }
+        }
+        Ok((count, secs))
+    }
 }

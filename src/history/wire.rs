@@ -9,10 +9,9 @@ use oxigraph::sparql::{
 };
 
 use crate::light::light;
-use crate::open::OpenStore;
 use crate::query::{evaluation_fault, prepare, refuse_excess, refuse_update};
 use crate::rdf_text::serializer;
-use crate::wanted::Wanted;
+use crate::view::{Dataset, Demand};
 use crate::{Cancel, History, RdfSyntax};
 use actcheck_base::{Diagnostic, Diagnostics, Source, Span};
 
@@ -107,11 +106,11 @@ impl History {
             );
             return Err(WireFault::Refused(fault.at(text, span).into()));
         }
-        let store = self
-            .store_for_query(|| Wanted::query(&text.text))
+        let query = prepare(self, text, &Cancel::new()).map_err(WireFault::Malformed)?;
+        let dataset = self
+            .dataset(Demand::query(&text.text))
             .map_err(WireFault::Failed)?;
-        let query = prepare(text, &store, &Cancel::new()).map_err(WireFault::Malformed)?;
-        let answer = evaluated(&store, query.prepared.clone(), text, choose, limits);
+        let answer = evaluated(&dataset, query.prepared.clone(), text, choose, limits);
         query.check_texts(text).map_err(WireFault::Refused)?;
         answer
     }
@@ -129,19 +128,19 @@ impl History {
         cancel: &Cancel,
     ) -> Option<Result<WireAnswer, WireFault>> {
         let query = light(&text.text)?;
-        let store = self
-            .store_for_query(|| Wanted::parsed(&query))
+        let dataset = self
+            .dataset(Demand::parsed(&query))
             .map_err(WireFault::Failed);
         let prepared = SparqlEvaluator::new()
             .with_cancellation_token(cancel.token())
             .for_query(query);
-        Some(store.and_then(|store| evaluated(&store, prepared, text, choose, limits)))
+        Some(dataset.and_then(|dataset| evaluated(&dataset, prepared, text, choose, limits)))
     }
 }
 
 /// Evaluates a query, and writes its answer.
 fn evaluated(
-    store: &OpenStore,
+    dataset: &Dataset,
     prepared: PreparedSparqlQuery,
     text: &Source,
     choose: impl Fn(&[WireSyntax]) -> Option<WireSyntax>,
@@ -149,7 +148,8 @@ fn evaluated(
 ) -> Result<WireAnswer, WireFault> {
     let failed =
         |error: QueryEvaluationError| WireFault::Failed(evaluation_fault(text, &error).into());
-    let written = match prepared.on_store(store).execute().map_err(failed)? {
+    let bound = prepared.on_queryable_dataset(dataset);
+    let written = match bound.execute().map_err(failed)? {
         QueryResults::Boolean(value) => {
             let syntax = choose(&WireSyntax::TABLES).ok_or(WireFault::NotAcceptable)?;
             let serializer = QueryResultsSerializer::from_format(table_format(syntax));

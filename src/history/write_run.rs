@@ -1,11 +1,12 @@
-//! A run as quads: the run, its executions, its outcomes, and its facts in named graphs.
+//! A run as statements: the run, its executions, and its outcomes.
 
 use std::collections::BTreeMap;
 
-use oxigraph::model::{BlankNode, Literal, NamedNode, Quad};
+use oxigraph::model::{BlankNode, NamedNode};
 
 use crate::graphs::{below, during_graph, state_graph};
-use crate::statements::{About, Statements, count, iri, time};
+use crate::segment::LaterJudgement;
+use crate::statements::{About, Statements, Value, iri};
 use crate::stored_run::StoredRun;
 use crate::write_campaign::{campaign_node, program};
 use crate::write_scene;
@@ -17,85 +18,120 @@ pub(super) fn run_node(id: &str) -> NamedNode {
     NamedNode::new_unchecked(format!("{}{id}", names::RUN))
 }
 
-/// The quads of a run of a campaign in the default graph.
-pub(super) fn quads_without_facts(stored: &StoredRun, campaign: &str) -> Vec<Quad> {
+/// The graph of judgements made after the run.
+pub(super) const RECHECKED: &str = "act:rechecked";
+
+/// Writes the statements about a run of a campaign in the default graph.
+pub(super) fn write(stored: &StoredRun, campaign: &str, statements: &mut Statements<'_>) {
     let run = run_node(&stored.id_in(campaign));
-    let mut statements = Statements::default();
-    write_run(stored, campaign, &run, &mut statements);
-    write_discards(stored, &run, &mut statements);
-    write_scene::write(&stored.scene, &run, &mut statements);
+    write_run(stored, campaign, &run, statements);
+    write_discards(stored, &run, statements);
+    write_scene::write(&stored.scene, &run, statements);
     for step in 0..stored.actions.len() {
-        write_execution(stored, step, &run, &mut statements);
+        write_execution(stored, step, &run, statements);
     }
-    statements.quads
 }
 
-fn write_run(stored: &StoredRun, campaign: &str, run: &NamedNode, statements: &mut Statements) {
+/// Writes the judgements made after a run, all of them in the order in which they were made, into
+/// the graph [`RECHECKED`]. Each supersedes the one before it of the same action and property.
+pub(super) fn write_later(
+    stored: &StoredRun,
+    campaign: &str,
+    later: &[&LaterJudgement],
+    statements: &mut Statements<'_>,
+) {
+    let run = run_node(&stored.id_in(campaign));
+    let mut newest: BTreeMap<(u32, &str), BlankNode> = BTreeMap::new();
+    for (step, action) in (1..).zip(&stored.actions) {
+        let node = below(&run, &step.to_string());
+        newest.extend(action.judgements.iter().map(|own| {
+            let property = own.property.as_str();
+            ((step, property), assertion_of(&node, property))
+        }));
+    }
+    for LaterJudgement {
+        step,
+        at,
+        judgement,
+        ..
+    } in later
+    {
+        let node = below(&run, &step.to_string());
+        let property = judgement.property.as_str();
+        let before = newest.remove(&(*step, property));
+        // Two of the same second have different predecessors, so that their nodes differ.
+        let label = before.as_ref().map(ToString::to_string).unwrap_or_default();
+        let of = |part| unique(&[node.as_str(), property, part, at, &label]);
+        let assertion = of("recheck");
+        let nodes = [assertion.clone(), of("recheck result")];
+        write_assertion(judgement, &node, nodes, statements);
+        statements
+            .about(assertion.clone())
+            .has("act:recheckedAt", Value::Time(at))
+            .optional("act:supersedes", before);
+        newest.insert((*step, property), assertion);
+    }
+}
+
+fn write_run(stored: &StoredRun, campaign: &str, run: &NamedNode, statements: &mut Statements<'_>) {
     let mut about = statements.about(run.clone());
     about
         .is_a("act:Run")
         .is_a("prov:Activity")
         .has("act:campaign", campaign_node(campaign))
-        .text("act:test", &stored.test)
-        .has("act:seed", count(stored.seed))
-        .has("act:index", count(stored.index))
+        .has("act:test", stored.test.as_str())
+        .has("act:seed", stored.seed)
+        .has("act:index", stored.index)
         .optional(
             "act:sceneNumber",
-            stored.repetition.map(|repetition| count(repetition.scene)),
+            stored.repetition.map(|repetition| repetition.scene),
         )
         .optional(
             "act:repetition",
-            stored.repetition.map(|repetition| count(repetition.number)),
+            stored.repetition.map(|repetition| repetition.number),
         )
-        .optional("act:weight", stored.weight.map(Literal::from))
-        .has("act:score", Literal::from(stored.score))
-        .text("act:status", stored.status.word())
-        .text("act:traceHash", &stored.trace_hash)
-        .has("act:discards", count(stored.discards.len() as u64))
+        .optional("act:weight", stored.weight)
+        .has("act:score", stored.score)
+        .has("act:status", stored.status.word())
+        .has("act:traceHash", stored.trace_hash.as_str())
+        .has("act:discards", stored.discards.len() as u64)
         .optional(
             "act:reason",
-            stored.reason.as_deref().map(Literal::new_simple_literal),
+            stored.reason.as_deref(),
         )
         .optional(
             "act:programOutput",
-            stored
-                .program_output
-                .as_deref()
-                .map(Literal::new_simple_literal),
+            stored.program_output.as_deref(),
         )
         .optional(
             "act:shrunkFrom",
             stored.shrunk_from.as_deref().map(run_node),
         )
-        .has("prov:startedAtTime", time(&stored.started))
-        .has("act:wallSeconds", Literal::from(stored.wall_secs))
-        .has("act:elapsedSeconds", Literal::from(stored.elapsed_secs))
+        .has("prov:startedAtTime", Value::Time(&stored.started))
+        .has("act:wallSeconds", stored.wall_secs)
+        .has("act:elapsedSeconds", stored.elapsed_secs)
         .optional(
             "act:deepestPenetration",
-            stored
-                .quality
-                .map(|quality| Literal::from(quality.deepest_penetration_m)),
+            stored.quality.map(|quality| quality.deepest_penetration_m),
         )
         .optional(
             "act:energyGain",
-            stored
-                .quality
-                .map(|quality| Literal::from(quality.energy_gain_j)),
+            stored.quality.map(|quality| quality.energy_gain_j),
         )
-        .text("act:program", &program(&stored.program_version));
+        .has("act:program", program(&stored.program_version).as_str());
     write_designators(&stored.scene.designators, stored, &mut about);
 }
 
 /// Writes the scenes that were discarded before the run's own, so that their number survives
 /// interrupting and resuming the campaign.
-fn write_discards(stored: &StoredRun, run: &NamedNode, statements: &mut Statements) {
+fn write_discards(stored: &StoredRun, run: &NamedNode, statements: &mut Statements<'_>) {
     for (number, reason) in stored.discards.iter().enumerate() {
         statements
             .about(below(run, &format!("discard/{}", number + 1)))
             .is_a("act:Discard")
             .has("act:ofRun", run.clone())
-            .has("act:attempt", count(number as u64 + 1))
-            .text("act:reason", reason);
+            .has("act:attempt", number as u64 + 1)
+            .has("act:reason", reason.as_str());
     }
 }
 
@@ -103,7 +139,7 @@ fn write_discards(stored: &StoredRun, run: &NamedNode, statements: &mut Statemen
 fn write_designators(
     designators: &BTreeMap<String, Vec<String>>,
     stored: &StoredRun,
-    about: &mut About<'_>,
+    about: &mut About<'_, '_>,
 ) {
     for (designator, values) in designators {
         let property = names::act(designator);
@@ -117,13 +153,13 @@ fn write_designators(
             {
                 about.has(&property, iri(&thing_iri(value)));
             } else {
-                about.text(&property, value);
+                about.has(&property, value.as_str());
             }
         }
     }
 }
 
-fn write_execution(stored: &StoredRun, step: usize, run: &NamedNode, statements: &mut Statements) {
+fn write_execution(stored: &StoredRun, step: usize, run: &NamedNode, statements: &mut Statements<'_>) {
     let action = &stored.actions[step];
     let node = below(run, &(step + 1).to_string());
     let mut about = statements.about(node.clone());
@@ -131,15 +167,12 @@ fn write_execution(stored: &StoredRun, step: usize, run: &NamedNode, statements:
         .is_a("act:ActionExecution")
         .has("act:ofRun", run.clone())
         .optional("act:action", action.action.as_deref().map(iri))
-        .has("act:step", Literal::from((step + 1) as u64))
-        .optional("act:score", action.score.map(Literal::from))
-        .text("act:end", &action.end)
-        .has("act:duration", Literal::from(action.duration_secs))
-        .optional("act:reported", action.reported.map(Literal::from))
-        .optional(
-            "act:message",
-            action.message.as_deref().map(Literal::new_simple_literal),
-        );
+        .has("act:step", (step + 1) as u64)
+        .optional("act:score", action.score)
+        .has("act:end", action.end.as_str())
+        .has("act:duration", action.duration_secs)
+        .optional("act:reported", action.reported)
+        .optional("act:message", action.message.as_deref());
     write_designators(&action.parameters, stored, &mut about);
     for (property, state) in [("act:before", step), ("act:after", step + 1)] {
         if state < stored.states as usize {
@@ -148,6 +181,9 @@ fn write_execution(stored: &StoredRun, step: usize, run: &NamedNode, statements:
     }
     if action.has_events {
         about.has("act:during", during_graph(run, step));
+    }
+    if !statements.wants(&OF_ASSERTIONS) {
+        return;
     }
     for judgement in &action.judgements {
         let result = unique(&[node.as_str(), &judgement.property, "result"]);
@@ -161,16 +197,32 @@ fn write_execution(stored: &StoredRun, step: usize, run: &NamedNode, statements:
 }
 
 /// The node of the campaign's own judgement of a property in an execution.
-pub(super) fn assertion_of(execution: &NamedNode, property: &str) -> BlankNode {
+fn assertion_of(execution: &NamedNode, property: &str) -> BlankNode {
     unique(&[execution.as_str(), property, "assertion"])
 }
 
+/// All properties of assertions and their results in the default graph.
+const OF_ASSERTIONS: [&str; 12] = [
+    "rdf:type",
+    "earl:subject",
+    "earl:test",
+    "earl:mode",
+    "earl:result",
+    "earl:outcome",
+    "act:outcome",
+    "act:margin",
+    "act:witness",
+    "act:ruleDigest",
+    "act:heldBefore",
+    "act:vacuous",
+];
+
 /// Writes a judgement as two nodes: the assertion and its result.
-pub(super) fn write_assertion(
+fn write_assertion(
     judgement: &Judgement,
     execution: &NamedNode,
     [assertion, result]: [BlankNode; 2],
-    statements: &mut Statements,
+    statements: &mut Statements<'_>,
 ) {
     statements
         .about(assertion)
@@ -185,16 +237,16 @@ pub(super) fn write_assertion(
             "earl:outcome",
             iri(&format!("earl:{}", judgement.outcome.earl())),
         )
-        .text("act:outcome", judgement.outcome.word())
-        .optional("act:margin", judgement.margin.map(Literal::from))
-        .text("act:witness", &judgement.witness)
-        .text("act:ruleDigest", &judgement.rule_digest)
-        .optional("act:heldBefore", judgement.held_before.map(Literal::from))
-        .optional("act:vacuous", judgement.vacuous.map(Literal::from));
+        .has("act:outcome", judgement.outcome.word())
+        .optional("act:margin", judgement.margin)
+        .has("act:witness", judgement.witness.as_str())
+        .has("act:ruleDigest", judgement.rule_digest.as_str())
+        .optional("act:heldBefore", judgement.held_before)
+        .optional("act:vacuous", judgement.vacuous);
 }
 
 /// A blank node whose label depends only on the texts.
-pub(super) fn unique(texts: &[&str]) -> BlankNode {
+fn unique(texts: &[&str]) -> BlankNode {
     let mut digest = Digest::new();
     for text in texts {
         digest.update(text.as_bytes());

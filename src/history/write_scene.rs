@@ -1,6 +1,6 @@
-//! A scene as quads: each object with its initial pose and its later displacement.
+//! A scene as statements: each object with its initial pose and its later displacement.
 
-use oxigraph::model::{Literal, NamedNode};
+use oxigraph::model::NamedNode;
 
 use crate::ObjectDetail;
 use crate::statements::{Statements, iri};
@@ -51,7 +51,7 @@ pub fn noise(scene: &Scene) -> [(&'static str, f64); 13] {
 
 /// Writes the scene of a run: values of the whole scene on the run's node, and one node for each
 /// object.
-pub(super) fn write(scene: &StoredScene, run: &NamedNode, statements: &mut Statements) {
+pub(super) fn write(scene: &StoredScene, run: &NamedNode, statements: &mut Statements<'_>) {
     let standing = scene
         .objects
         .iter()
@@ -59,24 +59,48 @@ pub(super) fn write(scene: &StoredScene, run: &NamedNode, statements: &mut State
         .count();
     let mut about = statements.about(run.clone());
     about
-        .text("act:worldName", &scene.world)
-        .text("act:robot", &scene.robot)
-        .has("act:objectCount", Literal::from(standing as u64));
+        .has("act:worldName", scene.world.as_str())
+        .has("act:robot", scene.robot.as_str())
+        .has("act:objectCount", standing as u64);
     for (property, value) in ["w:baseX", "w:baseY", "w:baseYaw"]
         .into_iter()
         .zip(scene.base)
     {
-        about.has(property, Literal::from(value));
+        about.has(property, value);
     }
     for (name, value) in NOISE_TERMS.into_iter().zip(scene.noise) {
-        about.has(&format!("act:{name}"), Literal::from(value));
+        about.has(&format!("act:{name}"), value);
     }
-    for object in &scene.objects {
-        write_object(object, run, statements);
+    if statements.wants(&OF_OBJECTS) {
+        for object in &scene.objects {
+            write_object(object, run, statements);
+        }
     }
 }
 
-fn write_object(object: &ObjectDetail, run: &NamedNode, statements: &mut Statements) {
+/// All properties of objects.
+const OF_OBJECTS: [&str; 18] = [
+    "rdf:type",
+    "act:ofRun",
+    "act:object",
+    "act:category",
+    "act:model",
+    "act:role",
+    "w:x",
+    "w:y",
+    "w:z",
+    "w:yaw",
+    "w:mass",
+    "w:friction",
+    "w:restitution",
+    "act:robotDistance",
+    "act:neighbourDistance",
+    "act:targetDistance",
+    "act:displacement",
+    "act:maxTilt",
+];
+
+fn write_object(object: &ObjectDetail, run: &NamedNode, statements: &mut Statements<'_>) {
     let thing = thing_iri(&object.id);
     let node = NamedNode::new_unchecked(format!("{}/scene/{}", run.as_str(), names::local(&thing)));
     let mut about = statements.about(node);
@@ -85,8 +109,8 @@ fn write_object(object: &ObjectDetail, run: &NamedNode, statements: &mut Stateme
         .has("act:ofRun", run.clone())
         .has("act:object", iri(&thing))
         .has("act:category", iri(&object.category))
-        .text("act:model", &object.model)
-        .text("act:role", object.role.word());
+        .has("act:model", object.model.as_str())
+        .has("act:role", object.role.word());
     for (property, value) in [
         ("w:x", object.x),
         ("w:y", object.y),
@@ -97,7 +121,7 @@ fn write_object(object: &ObjectDetail, run: &NamedNode, statements: &mut Stateme
         ("w:restitution", object.restitution),
         ("act:robotDistance", object.robot_distance_m),
     ] {
-        about.has(property, Literal::from(value));
+        about.has(property, value);
     }
     for (property, value) in [
         ("act:neighbourDistance", object.neighbour_distance_m),
@@ -105,6 +129,6 @@ fn write_object(object: &ObjectDetail, run: &NamedNode, statements: &mut Stateme
         ("act:displacement", object.displacement_m),
         ("act:maxTilt", object.max_tilt_rad),
     ] {
-        about.optional(property, value.map(Literal::from));
+        about.optional(property, value);
     }
 }

@@ -55,7 +55,6 @@ impl Mirror {
         for (number, source) in sources.iter().enumerate() {
             let kept: HashSet<&str> = plan.kept_ids(number).collect();
             let found = files_of(source)?;
-            source.rest();
             let known = Checked::read(&tables_of(source));
             for (campaign, digest, file) in found
                 .into_iter()

@@ -28,8 +28,6 @@ const RUNS_IN_A_FILE: usize = 2_000;
 const MOST_PARTS: usize = 16;
 /// Maximum number of rows of a file: a run has some dozens.
 const MOST_ROWS: usize = 1_000 * RUNS_IN_A_FILE;
-/// Code of the fault for a trace that is missing.
-const MISSING_TRACE: &str = "H009";
 /// File with the digest of the columns.
 pub(super) const SCHEMA: &str = "SCHEMA";
 /// File with the number of judgements that `recheck` had added to each campaign when its files were
@@ -388,7 +386,7 @@ impl Mirror {
             .iter()
             .filter(|run| !there.contains(&index_of(run)))
             .collect();
-        history.sort_as_stored(campaign, &mut missing)?;
+        missing.sort_by_key(|run| index_of(run));
         for runs in missing.chunks(RUNS_IN_A_FILE) {
             let mut rows = Rows::default();
             for run in table_runs(history, runs) {
@@ -524,15 +522,10 @@ fn table_runs(history: &History, runs: &[&String]) -> Vec<Result<TableRun, Diagn
     })
 }
 
-/// Reads a run. Noise and effects are unknown if its trace is missing.
+/// Reads a run.
 fn table_run(history: &History, run: &str) -> Result<TableRun, Diagnostics> {
-    let detail = history.newest_run(run)?;
-    Ok(match history.recorded(run) {
-        Ok((choices, trace)) => TableRun::new(detail, &choices, &trace),
-        Err(faults) if faults.iter().all(|fault| fault.code == MISSING_TRACE) => detail.into(),
-        // Other numbers than without the damage.
-        Err(faults) => return Err(faults),
-    })
+    let (choices, trace) = history.recorded(run)?;
+    Ok(TableRun::new(history.newest_run(run)?, &choices, &trace))
 }
 
 /// Whether all files have the digests that their names say.

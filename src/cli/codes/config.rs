@@ -115,7 +115,7 @@ const CODES_C: &[Code] = &[
     code(
         "C018",
         "motion of runs that a program performs may be lost",
-        "the history keeps outlines, and a program may not do the same a second time",
+        "the history does not keep motion, and a program may not do the same a second time",
         "`keep = \"all\"` in `[history]` keeps the motion",
     ),
     code(

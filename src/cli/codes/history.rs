@@ -37,7 +37,7 @@ const CODES_H: &[Code] = &[
     code(
         "H005",
         "the disk of the history is full",
-        "runs and traces need space",
+        "runs need space",
         "free some space and run again; stored data is complete",
     ),
     code(
@@ -60,9 +60,9 @@ const CODES_H: &[Code] = &[
     ),
     code(
         "H009",
-        "the trace of a run can't be read",
-        "its file is missing",
-        "restore the file from a backup; outcomes and facts of the run are intact",
+        "values of a run can't be read",
+        "a file of its segment is missing",
+        "restore the file from a backup; the other files are intact",
     ),
     code(
         "H010",
@@ -79,7 +79,7 @@ const CODES_H: &[Code] = &[
     code(
         "H012",
         "a query failed",
-        "it uses `SERVICE`, or the store could not answer",
+        "it uses `SERVICE`, or the evaluator could not answer",
         "query only the history; if the help names no way out, report this bug",
     ),
     code(
@@ -174,19 +174,19 @@ const CODES_H: &[Code] = &[
     ),
     code(
         "H029",
-        "the journal of a history ends early, or runs are missing from it",
+        "a segment of a history ends early, or runs are missing from it",
         "a process was killed or lost power while it wrote, the disk was full, or a copy is incomplete",
-        "restore the file `journal` from a backup, or `actcheck run --resume ID` makes the missing runs again",
+        "restore the file from a backup, or `actcheck run --resume ID` makes the missing runs again",
     ),
     code(
         "H030",
-        "a query needs too many statements about runs that are kept as outlines",
-        "most queries read columns of outlines; facts, any property, paths and blank nodes as values need their statements in the store",
-        "leave that part out, ask a smaller history, or export tables (`actcheck export tables`)",
+        "a query needs more statements than fit in memory",
+        "it asks about many runs for facts, or for any property",
+        "name the properties, ask a smaller history, or export tables (`actcheck export tables`)",
     ),
     code(
         "H031",
-        "a run that is kept as an outline can't be simulated again",
+        "a run whose motion is not kept can't be simulated again",
         "a model, a rule of the scene or the program changed since, so that another run would result",
         "`actcheck replay` names the changes; the run's outcomes and states are intact",
     ),

@@ -72,7 +72,6 @@ fn merged(
     let mut sources = Vec::new();
     for number in 1..=plan.shards {
         let source = History::open_to_read(&plan.shard_dir(number))?;
-        source.rest();
         sources.push(source);
     }
     let planned = plan_merge(&sources, Some(history), &MergeOptions::default())?;

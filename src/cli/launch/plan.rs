@@ -357,11 +357,7 @@ impl Plan {
 
     /// Number of runs that the shards have stored; `done` are complete.
     pub fn stored_runs(&self, done: &BTreeSet<u64>) -> u64 {
-        let stored = |number: u64| {
-            let folder = self.shard_dir(number);
-            let whole = self.below().files(&folder.join("traces")).len() as u64;
-            whole + History::count_outlines(&folder)
-        };
+        let stored = |number: u64| History::count_runs(&self.shard_dir(number));
         let of = |number: u64| match self.shard(number) {
             Some(shard) if done.contains(&number) => shard.share(self.planned),
             _ => stored(number),

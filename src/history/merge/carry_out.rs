@@ -1,32 +1,25 @@
-//! Carries out a plan: writes each campaign's statements, then its runs, each in one transaction,
-//! then its end.
+//! Carries out a plan: writes each campaign without its end, then its runs, then its end.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use oxigraph::model::{GraphName, GraphNameRef, Literal, NamedNode, Quad};
-use oxigraph::store::{StorageError, Store};
-
-use crate::merge::copy::about;
+use crate::campaign::CampaignRuns;
+use crate::campaign_state::CampaignState;
+use crate::history::{place_of, run_id};
 use crate::merge::plan::{MergePlan, PlannedEnd, PlannedMerge};
-use crate::merge::renames::Renames;
-use crate::outlines::Outline;
-use crate::read::text_of;
-use crate::statements::{Statements, count, iri, time};
-use crate::write_campaign::{self, NUMBER, campaign_node};
-use crate::write_run::run_node;
-use crate::{History, fault, folder};
-use actcheck_base::{Diagnostic, Diagnostics};
+use crate::merge::survey::identity;
+use crate::segment::{
+    LaterJudgement, ReadFault, RunContent, Segment, SegmentColumn, copy_column,
+};
+use crate::{FAILED_AGAIN, History, fault};
+use actcheck_base::Diagnostics;
 
 /// The result of a merge.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Merged {
     /// Number of added runs.
     pub runs: u64,
-    /// Runs whose traces were already missing in their histories: only their data from the store
-    /// was merged.
-    pub without_trace: Vec<String>,
     /// Whether the merge was stopped before everything was written.
     pub interrupted: bool,
 }
@@ -45,311 +38,266 @@ pub fn carry_out(
     stop: &AtomicBool,
     mut on_run: impl FnMut(),
 ) -> Result<Merged, Diagnostics> {
-    let renames: Vec<Renames> = (0..sources.len())
-        .map(|source| {
-            let of_source = plan.ids.iter().filter(|((of, _), _)| *of == source);
-            Renames::new(of_source.map(|((_, old), new)| (old.clone(), new.clone())))
-        })
-        .collect();
+    let new_ids = (0..sources.len()).map(|source| {
+        let of_source = plan.ids.iter().filter(|((of, _), _)| *of == source);
+        NewIds(of_source.map(|((_, old), new)| (old.clone(), new.clone())).collect())
+    });
     let mut writer = Writer {
         sources,
-        renames,
+        new_ids: new_ids.collect(),
         into,
         merged: Merged::default(),
     };
     for campaign in &plan.campaigns {
         writer.begin(campaign)?;
-        let copied = match writer.copy_files(campaign, stop, &mut on_run)? {
-            Some(copied) => copied,
-            None => {
-                into.flush()?;
-                return Ok(writer.merged);
-            }
-        };
-        for (index, (source, run)) in campaign
-            .work
-            .runs
-            .iter()
-            .filter(|(index, _)| !copied.contains(index))
-        {
-            if stop.load(Ordering::Relaxed) {
-                writer.merged.interrupted = true;
-                into.flush()?;
-                return Ok(writer.merged);
-            }
-            let new = format!("{}-{}", campaign.id, index + 1);
-            writer.run(*source, run, &new)?;
-            on_run();
+        if !writer.add_runs(campaign, stop, &mut on_run)? {
+            writer.merged.interrupted = true;
+            into.close_writers(&campaign.id)?;
+            return Ok(writer.merged);
         }
-        for (source, run) in campaign.work.judgements.values() {
-            writer.judgements(*source, run)?;
-        }
-        into.shelf()
-            .pack(&campaign.id)
-            .map_err(|error| fault::io(into.dir(), "writing outlines", &error))?;
+        writer.add_judgements(campaign)?;
+        into.close_writers(&campaign.id)?;
         writer.end(campaign)?;
     }
-    into.load_journal()?;
-    into.flush()?;
-    into.reopen()?;
     Ok(writer.merged)
+}
+
+/// New ids of the campaigns of a history by their old ones, also unchanged ones.
+struct NewIds(BTreeMap<String, String>);
+
+impl NewIds {
+    /// The new id of a run. Returns `None` if it does not change.
+    fn of_run(&self, id: &str) -> Option<String> {
+        let (campaign, index) = place_of(id)?;
+        let new = self.0.get(campaign).filter(|new| *new != campaign)?;
+        Some(run_id(new, index))
+    }
+
+    /// The new name of a campaign, which may end in the id of a shrunk run, or of a campaign whose
+    /// failed runs were run again.
+    fn of_name(&self, name: &str) -> String {
+        if let Some(new) = name
+            .strip_prefix(FAILED_AGAIN)
+            .and_then(|old| self.0.get(old))
+        {
+            return format!("{FAILED_AGAIN}{new}");
+        }
+        let renamed = name
+            .rsplit_once(' ')
+            .and_then(|(words, run)| Some(format!("{words} {}", self.of_run(run)?)));
+        renamed.unwrap_or_else(|| name.to_owned())
+    }
 }
 
 struct Writer<'a> {
     sources: &'a [History],
-    renames: Vec<Renames>,
+    new_ids: Vec<NewIds>,
     into: &'a History,
     merged: Merged,
 }
 
 impl Writer<'_> {
-    /// Writes the statements about a campaign without its end, so that readers see it as
-    /// unfinished.
+    /// Writes a campaign without its end, so that readers see it as unfinished.
     fn begin(&self, campaign: &PlannedMerge) -> Result<(), Diagnostics> {
         let work = &campaign.work;
-        let node = campaign_node(&campaign.id);
-        let mut statements = Statements::default();
-        let mut about = statements.about(node.clone());
-        for shard in &work.shards {
-            about.text("act:shard", shard);
-        }
-        about.optional("prov:startedAtTime", work.started.as_deref().map(time));
-        if work.started.is_some() {
-            about.has(NUMBER, count(self.into.campaign_ids()?.len() as u64));
-        }
-        let mut quads = statements.quads;
-        if let Some((source, id)) = &work.statements {
-            quads.extend(self.statements(campaign, *source, id)?);
-        }
-        let ends = if matches!(work.end, PlannedEnd::Same) {
-            Vec::new()
-        } else {
-            self.ends(&node)?
+        let (source, copied) = &work.record;
+        let mut state = match self.into.state_of(&campaign.id)? {
+            Some(known) => (*known).clone(),
+            None => CampaignState {
+                number: self.into.campaign_ids()?.len() as u64,
+                segments: BTreeMap::new(),
+                ..copied.clone()
+            },
         };
-        self.write(&quads, &ends)
-    }
-
-    /// A source's statements about a campaign that the destination lacks, without its start and
-    /// end.
-    fn statements(
-        &self,
-        campaign: &PlannedMerge,
-        source: usize,
-        id: &str,
-    ) -> Result<Vec<Quad>, Diagnostics> {
-        let [start, number, path, first] = [
-            "prov:startedAtTime",
-            NUMBER,
-            "act:configPath",
-            "act:firstId",
-        ]
-        .map(iri);
-        let mut quads = self.about(source, &campaign_node(id))?;
-        quads.retain(|quad| !is_end(quad) && quad.predicate != start && quad.predicate != number);
-        for quad in quads.iter_mut().filter(|quad| quad.predicate == path) {
-            let path = relative_path_from(
-                &text_of(&quad.object),
-                self.sources[source].dir(),
+        if let Some(source) = source {
+            let record = &mut state.record;
+            record.clone_from(&copied.record);
+            record.id.clone_from(&campaign.id);
+            record.name = self.new_ids[*source].of_name(&record.name);
+            record.config_path = relative_path_from(
+                &record.config_path,
+                self.sources[*source].dir(),
                 self.into.dir(),
             );
-            quad.object = Literal::new_simple_literal(path).into();
+            let is_renamed = copied.record.id != campaign.id && !campaign.joined;
+            state.first_id = copied
+                .first_id
+                .clone()
+                .or_else(|| is_renamed.then(|| copied.record.id.clone()));
         }
-        if id != campaign.id
-            && !campaign.joined
-            && !quads.iter().any(|quad| quad.predicate == first)
-        {
-            let mut statements = Statements::default();
-            statements
-                .about(campaign_node(&campaign.id))
-                .text("act:firstId", id);
-            quads.extend(statements.quads);
+        state.record.shards.clone_from(&work.shards);
+        state.record.started.clone_from(&work.started);
+        if !matches!(work.end, PlannedEnd::Same) || source.is_some() {
+            state.end = None;
         }
-        Ok(quads)
+        self.into.write_state(&state)
     }
 
-    /// Copies the files of outlines whose runs are all wanted and keep their ids. Returns the
-    /// indices of these runs, or `None` if the merge was stopped.
-    fn copy_files(
+    /// Adds the runs of a campaign. Returns whether it was not stopped.
+    fn add_runs(
         &mut self,
         campaign: &PlannedMerge,
         stop: &AtomicBool,
         on_run: &mut impl FnMut(),
-    ) -> Result<Option<BTreeSet<u64>>, Diagnostics> {
-        let (mut copied, mut files) = (BTreeSet::new(), Vec::new());
-        let sources: BTreeSet<usize> = campaign
-            .work
-            .runs
-            .values()
-            .map(|(source, _)| *source)
-            .collect();
-        for source in sources {
-            let history = &self.sources[source];
-            let is_simple = history.shelf().exists() && !history.has_later_judgements()?;
-            history.rest();
-            if !is_simple {
-                continue;
-            }
-            let is_wanted = |index: u64| {
-                let run = format!("{}-{}", campaign.id, index + 1);
-                campaign
-                    .work
-                    .runs
-                    .get(&index)
-                    .is_some_and(|(of, known)| *of == source && *known == run)
-            };
-            for (file, indices) in history.outline_files(&campaign.id)? {
+    ) -> Result<bool, Diagnostics> {
+        let wanted = &campaign.work.runs;
+        let origins: BTreeSet<&(usize, String)> = wanted.values().collect();
+        for origin in origins {
+            let (source, id) = (origin.0, &origin.1);
+            let runs = self.sources[source].runs_of(id)?;
+            let is_wanted = |index: u64| wanted.get(&index) == Some(origin);
+            for segment in &runs.segments {
                 if stop.load(Ordering::Relaxed) {
-                    self.merged.interrupted = true;
-                    return Ok(None);
+                    return Ok(false);
                 }
-                if indices
-                    .iter()
-                    .any(|index| !is_wanted(*index) || copied.contains(index))
+                let mut rows = segment.rows().iter();
+                if rows.all(|row| is_wanted(row.index))
+                    && self.copy_segment(source, campaign, &runs, segment)?
                 {
+                    self.merged.runs += segment.rows().len() as u64;
+                    segment.rows().iter().for_each(|_| on_run());
                     continue;
                 }
-                if let Some(new) = self.into.copy_outlines(&file)? {
-                    files.push(new);
-                    self.merged.runs += indices.len() as u64;
-                    indices.iter().for_each(|_| on_run());
-                    copied.extend(indices);
+                let is_first = |index: u64| {
+                    let first = runs.find(index);
+                    first.is_some_and(|run| run.segment.number() == segment.number())
+                };
+                for row in segment.rows() {
+                    if !(is_wanted(row.index) && is_first(row.index)) {
+                        continue;
+                    }
+                    if stop.load(Ordering::Relaxed) {
+                        return Ok(false);
+                    }
+                    self.add_run(source, campaign, &runs, row.index)?;
+                    on_run();
                 }
             }
         }
-        self.into.sync_outlines(&files)?;
-        Ok(Some(copied))
+        Ok(true)
     }
 
-    fn run(&mut self, source: usize, run: &str, new: &str) -> Result<(), Diagnostics> {
-        let doing = format!("writing run {new}");
-        if let Some((outline, later)) = self.outlined(source, run)? {
-            if let (Some((campaign, _)), Some(row)) =
-                (new.rsplit_once('-'), outline.rows.rows.first())
-            {
-                self.into.enter_outline(campaign, row.index, &outline)?;
+    /// Copies the files of a segment, if that is possible: its runs need no new values.
+    fn copy_segment(
+        &self,
+        source: usize,
+        campaign: &PlannedMerge,
+        runs: &CampaignRuns,
+        segment: &Segment,
+    ) -> Result<bool, Diagnostics> {
+        let history = &self.sources[source];
+        let has_twice = || {
+            let mut rows = segment.rows().iter();
+            rows.any(|row| {
+                let first = runs.find(row.index);
+                first.is_none_or(|run| !std::ptr::eq(run.row, row))
+            })
+        };
+        let is_shrunk = || segment.rows().iter().any(|row| row.is_shrunk);
+        if history.is_salvaged() || segment.rows().is_empty() || is_shrunk() || has_twice() {
+            return Ok(false);
+        }
+        let (from, to) = (history.folder.below(), self.into.folder.below());
+        let folder = self.into.folder.campaign(&campaign.id);
+        let number = self.into.next_segment(&campaign.id)?;
+        for column in SegmentColumn::OF_RUNS {
+            let Some(end) = segment.end_of(column) else {
+                continue;
+            };
+            let (old, new) = (
+                segment.file(column),
+                folder.join(format!("{number:04}.{}", column.extension())),
+            );
+            match copy_column(&from, &old, column, end, &to, &new) {
+                Ok(()) => {}
+                Err(ReadFault::Io(error)) => {
+                    return Err(fault::io(self.into.dir(), "writing merged data", &error));
+                }
+                Err(why @ ReadFault::Damaged(_)) => {
+                    return Err(fault::segment(&history.folder, &old, &why));
+                }
             }
-            self.write(&later, &[])?;
-            self.merged.runs += 1;
+        }
+        Ok(true)
+    }
+
+    fn add_run(
+        &mut self,
+        source: usize,
+        campaign: &PlannedMerge,
+        runs: &CampaignRuns,
+        index: u64,
+    ) -> Result<(), Diagnostics> {
+        let Some(run) = runs.find(index) else {
             return Ok(());
+        };
+        let history = &self.sources[source];
+        let id = run_id(&runs.id, index);
+        let unread = |column| move |why| history.unread(&id, run, column, &why);
+        let mut stored = run
+            .segment
+            .run(run.row)
+            .map_err(unread.clone()(SegmentColumn::Details))?;
+        if let Some(from) = &mut stored.shrunk_from
+            && let Some(new) = self.new_ids[source].of_run(from)
+        {
+            *from = new;
         }
-        match folder::read(&self.sources[source].trace_path(run)) {
-            Ok(bytes) => self
-                .into
-                .folder
-                .below()
-                .write_atomic(&self.into.trace_path(new), &bytes)
-                .map_err(|error| fault::io(self.into.dir(), &doing, &error))?,
-            Err(_) => self.merged.without_trace.push(new.to_owned()),
-        }
-        self.write(&self.about(source, &run_node(run))?, &[])?;
+        let states = run
+            .segment
+            .states(run.row)
+            .map_err(unread.clone()(SegmentColumn::States))?;
+        let motion = run
+            .segment
+            .packed_motion(run.row)
+            .map_err(unread(SegmentColumn::Motion))?;
+        let doing = format!("writing run {}", run_id(&campaign.id, index));
+        self.into.with_segment(&campaign.id, &doing, |segment| {
+            segment.append(&RunContent {
+                run: &stored,
+                states: &states,
+                motion: motion.as_deref(),
+            })
+        })?;
         self.merged.runs += 1;
         Ok(())
     }
 
-    /// Copies only later judgements: the destination has the rest of the run.
-    fn judgements(&self, source: usize, run: &str) -> Result<(), Diagnostics> {
-        let later = GraphName::from(iri("act:rechecked"));
-        let mut quads = match self.outlined(source, run)? {
-            Some((_, later)) => later,
-            None => self.about(source, &run_node(run))?,
-        };
-        quads.retain(|quad| quad.graph_name == later);
-        self.write(&quads, &[])
+    /// Adds the later judgements of runs that the destination lacks, in the order in which they
+    /// were made.
+    fn add_judgements(&self, campaign: &PlannedMerge) -> Result<(), Diagnostics> {
+        let known = self.into.runs_of(&campaign.id)?;
+        let known: BTreeSet<(u64, String)> = known
+            .later
+            .iter()
+            .map(|later| (later.index, identity(later)))
+            .collect();
+        let work = &campaign.work;
+        let origins: BTreeSet<&(usize, String)> =
+            work.runs.values().chain(work.judgements.values()).collect();
+        for origin in origins {
+            let runs = self.sources[origin.0].runs_of(&origin.1)?;
+            let is_new = |later: &&LaterJudgement| {
+                let of_run = [&work.runs, &work.judgements];
+                of_run.iter().any(|runs| runs.get(&later.index) == Some(origin))
+                    && !known.contains(&(later.index, identity(later)))
+            };
+            let new: Vec<LaterJudgement> = runs.later.iter().filter(is_new).cloned().collect();
+            if !new.is_empty() {
+                self.into
+                    .with_judgements(&campaign.id, |column| column.append(&new))?;
+            }
+        }
+        Ok(())
     }
 
     fn end(&self, campaign: &PlannedMerge) -> Result<(), Diagnostics> {
-        let quads = match &campaign.work.end {
-            PlannedEnd::Same => return Ok(()),
-            PlannedEnd::Of(source, id) => {
-                let mut quads = self.about(*source, &campaign_node(id))?;
-                quads.retain(is_end);
-                quads
+        self.into.change_state(&campaign.id, |state| {
+            if let PlannedEnd::New(end) = &campaign.work.end {
+                state.end = end.as_deref().cloned();
             }
-            PlannedEnd::Computed(end) => write_campaign::end(&campaign.id, end),
-        };
-        self.write(&quads, &[])?;
-        self.into.flush()
+        })
     }
-
-    /// The outline of a run and the judgements made after it, with the ids of the destination.
-    /// Returns `None` if the run is kept whole.
-    fn outlined(
-        &self,
-        source: usize,
-        run: &str,
-    ) -> Result<Option<(Outline, Vec<Quad>)>, Diagnostics> {
-        let history = &self.sources[source];
-        let Some(outline) = history.outline(run)? else {
-            return Ok(None);
-        };
-        // Together, because later judgements name those that they supersede.
-        let mut quads = outline.quads;
-        quads.extend(history.later_about_outline(run, &*history.store()?)?);
-        let (own, later) = self.renames[source]
-            .apply(quads)
-            .into_iter()
-            .partition(|quad| quad.graph_name == GraphName::DefaultGraph);
-        Ok(Some((
-            Outline {
-                quads: own,
-                ..outline
-            },
-            later,
-        )))
-    }
-
-    /// All statements of a source about a campaign or run, with the ids of the destination.
-    fn about(&self, source: usize, node: &NamedNode) -> Result<Vec<Quad>, Diagnostics> {
-        let history = &self.sources[source];
-        let quads =
-            about(&*history.store()?, node).map_err(|error| history.fault("reading it", &error))?;
-        Ok(self.renames[source].apply(quads))
-    }
-
-    /// The end of a campaign that an earlier process wrote, so that it is not in the journal of
-    /// this one.
-    fn ends(&self, node: &NamedNode) -> Result<Vec<Quad>, Diagnostics> {
-        let store = self.into.bare_store()?;
-        let quads = store.quads_for_pattern(
-            Some(node.into()),
-            None,
-            None,
-            Some(GraphNameRef::DefaultGraph),
-        );
-        let ends: Result<Vec<Quad>, StorageError> = quads
-            .filter(|quad| quad.as_ref().map_or(true, is_end))
-            .collect();
-        ends.map_err(|error| self.into.fault("reading a campaign", &error))
-    }
-
-    /// Adds and removes quads in one transaction.
-    fn write(&self, new: &[Quad], old: &[Quad]) -> Result<(), Diagnostics> {
-        if new.is_empty() && old.is_empty() {
-            return Ok(());
-        }
-        if old.is_empty() {
-            self.into.enter_quads(new, "writing merged data")?;
-            return self.into.load_long_journal();
-        }
-        replace(&*self.into.store()?, new, old)
-            .map_err(|error| self.into.fault("writing merged data", &error))
-    }
-}
-
-fn replace(store: &Store, new: &[Quad], old: &[Quad]) -> Result<(), StorageError> {
-    let mut transaction = store.start_transaction()?;
-    for quad in old {
-        transaction.remove(quad);
-    }
-    for quad in new {
-        transaction.insert(quad);
-    }
-    transaction.commit()
-}
-
-/// Whether a quad about a campaign describes its end.
-fn is_end(quad: &Quad) -> bool {
-    write_campaign::end_properties().contains(&quad.predicate)
 }
 
 /// Converts a path relative to one folder into a path relative to another. Returns it unchanged if
@@ -362,18 +310,21 @@ fn relative_path_from(path: &str, from: &Path, to: &Path) -> String {
     seen.map_or_else(|| path.to_owned(), |path| path.display().to_string())
 }
 
-impl Merged {
-    /// Returns a warning about runs whose traces were already missing, or `None` if no trace is
-    /// missing.
-    pub fn warning(&self) -> Option<Diagnostic> {
-        let first = self.without_trace.first()?;
-        let message = format!(
-            "{} runs had no trace before the merge, the first is {first}",
-            self.without_trace.len()
-        );
-        Some(
-            Diagnostic::warning("H009", message)
-                .help("their outcomes and facts were merged; replay and recheck need traces"),
-        )
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_campaign_with_the_id_is_renamed() {
+        let ids = NewIds(BTreeMap::from([
+            ("k".to_owned(), "m".to_owned()),
+            ("a".to_owned(), "a".to_owned()),
+        ]));
+        assert_eq!(ids.of_run("k-12"), Some("m-12".to_owned()));
+        assert_eq!(ids.of_run("kk-1"), None);
+        assert_eq!(ids.of_run("a-1"), None);
+        assert_eq!(ids.of_name("shrunk k-3"), "shrunk m-3");
+        assert_eq!(ids.of_name("failed runs of k"), "failed runs of m");
+        assert_eq!(ids.of_name("pick"), "pick");
     }
 }

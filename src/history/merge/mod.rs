@@ -9,11 +9,8 @@
 
 mod carry_out;
 mod conflict;
-mod copy;
 mod plan;
-mod renames;
 mod survey;
 
 pub use carry_out::{Merged, carry_out};
-pub(crate) use copy::about;
 pub use plan::{MergeOptions, MergePlan, PlannedMerge, plan};

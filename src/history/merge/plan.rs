@@ -3,9 +3,10 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::campaign_state::CampaignState;
 use crate::merge::conflict;
 use crate::merge::survey::{Found, FoundRun, survey};
-use crate::store::campaign_id;
+use crate::history::campaign_id;
 use crate::{CampaignEnd, History, RunStatus};
 use actcheck_base::{Diagnostic, Diagnostics, Outcome, Shard, did_you_mean};
 use actcheck_verdict::{Counts, mean};
@@ -63,16 +64,15 @@ pub struct PlannedMerge {
 /// The writes for one campaign.
 #[derive(Debug, Clone)]
 pub(super) struct Work {
-    /// Source history and id of the campaign whose statements are copied; `None` if the destination
-    /// has them.
-    pub(super) statements: Option<(usize, String)>,
-    /// Parts that the destination's campaign does not list yet.
-    pub(super) shards: Vec<String>,
-    /// Start of the first part; `None` if the start does not change.
-    pub(super) started: Option<String>,
-    /// Source history and id of each run to copy, by index.
+    /// The campaign whose record is copied.
+    pub(super) record: (Option<usize>, CampaignState),
+    /// Parts that the campaign consists of.
+    pub(super) shards: Vec<Shard>,
+    /// Start of the first part.
+    pub(super) started: String,
+    /// Source history and campaign of each run to copy, by index.
     pub(super) runs: BTreeMap<u64, (usize, String)>,
-    /// Source history and id of each run of which only later judgements are new, by index.
+    /// Source history and campaign of each run of which only later judgements are new, by index.
     pub(super) judgements: BTreeMap<u64, (usize, String)>,
     pub(super) end: PlannedEnd,
 }
@@ -82,10 +82,8 @@ pub(super) struct Work {
 pub(super) enum PlannedEnd {
     /// Unchanged, or missing.
     Same,
-    /// Copied from a source history and id.
-    Of(usize, String),
-    /// Computed from the parts.
-    Computed(Box<CampaignEnd>),
+    /// Copied, or computed from the parts.
+    New(Option<Box<CampaignEnd>>),
 }
 
 /// Reads all histories and plans their merge into another one. Writes nothing.
@@ -102,7 +100,6 @@ pub fn plan(
     let mut found = Vec::new();
     for (number, source) in sources.iter().enumerate() {
         found.extend(survey(source, Some(number))?);
-        source.rest();
     }
     let found = without(found, &options.leave_out)?;
     let own = into
@@ -376,9 +373,9 @@ fn planned(group: &[&Found], id: String) -> PlannedMerge {
         planned: first.record.planned_runs,
         missing,
         work: Work {
-            statements: first.source.map(|source| (source, first.record.id.clone())),
-            shards: new_shards(group, own),
-            started: own.is_none().then(|| started(group)),
+            record: (first.source, (*first.state).clone()),
+            shards: all_shards(group),
+            started: own.map_or_else(|| started(group), |own| own.record.started.clone()),
             runs,
             judgements,
             end,
@@ -393,7 +390,7 @@ fn best_copies<'a>(group: &[&'a Found]) -> BTreeMap<u64, Copy<'a>> {
     // The destination's copy comes first, and is kept unless another is better.
     for found in group {
         for (index, run) in &found.runs {
-            let rank = |run: &FoundRun| (Reverse(run.later.len()), run.row.started.clone());
+            let rank = |run: &FoundRun| (Reverse(run.later.len()), run.started.clone());
             let better = best
                 .get(index)
                 .is_none_or(|(_, known)| rank(run) < rank(known));
@@ -405,30 +402,24 @@ fn best_copies<'a>(group: &[&'a Found]) -> BTreeMap<u64, Copy<'a>> {
     best
 }
 
-/// Source history and id of each wanted run, by index. Excludes runs of the destination.
+/// Source history and campaign of each wanted run, by index. Excludes runs of the destination.
 fn copies(
     best: &BTreeMap<u64, Copy<'_>>,
     wanted: impl Fn(u64, &FoundRun) -> bool,
 ) -> BTreeMap<u64, (usize, String)> {
     let wanted = best.iter().filter(|(index, (_, run))| wanted(**index, run));
     wanted
-        .filter_map(|(index, (found, run))| Some((*index, (found.source?, run.row.run.clone()))))
+        .filter_map(|(index, (found, _))| Some((*index, (found.source?, found.record.id.clone()))))
         .collect()
 }
 
-/// Parts of the group that the destination's campaign does not list yet.
-fn new_shards(group: &[&Found], own: Option<&Found>) -> Vec<String> {
-    let of = |found: &Found| {
-        found
-            .record
-            .shards
-            .iter()
-            .copied()
-            .collect::<BTreeSet<Shard>>()
-    };
-    let said = own.map(of).unwrap_or_default();
-    let all: BTreeSet<Shard> = group.iter().flat_map(|found| of(found)).collect();
-    all.difference(&said).map(ToString::to_string).collect()
+/// The parts of which the group consists, sorted.
+fn all_shards(group: &[&Found]) -> Vec<Shard> {
+    let all: BTreeSet<Shard> = group
+        .iter()
+        .flat_map(|found| found.record.shards.iter().copied())
+        .collect();
+    all.into_iter().collect()
 }
 
 /// The end of the most complete copy.
@@ -443,10 +434,10 @@ fn end_of_copies(group: &[&Found]) -> PlannedEnd {
     };
     // Among equals, the first wins.
     match group.iter().rev().max_by_key(rank) {
-        Some(found) => found.source.map_or(PlannedEnd::Same, |source| {
-            PlannedEnd::Of(source, found.record.id.clone())
-        }),
-        None => PlannedEnd::Same,
+        Some(found) if found.source.is_some() => {
+            PlannedEnd::New(found.state.end.clone().map(Box::new))
+        }
+        _ => PlannedEnd::Same,
     }
 }
 
@@ -471,13 +462,13 @@ fn end_of_parts(
     let runs = || best.values().map(|(_, run)| run);
     let mut counts = Counts::default();
     runs().for_each(|run| counts.add_all(run.counts));
-    PlannedEnd::Computed(Box::new(CampaignEnd {
+    PlannedEnd::New(Some(Box::new(CampaignEnd {
         ended,
-        score: mean(runs().map(|run| run.row.score)),
+        score: mean(runs().map(|run| run.score)),
         score_without_broken: mean(
             runs()
-                .filter(|run| run.row.status != RunStatus::Broken)
-                .map(|run| run.row.score),
+                .filter(|run| run.status != RunStatus::Broken)
+                .map(|run| run.score),
         ),
         outcomes: Outcome::ALL
             .into_iter()
@@ -490,5 +481,5 @@ fn end_of_parts(
             .filter_map(|found| found.row.ended_by.clone())
             .find(|budget| budget == "failures"),
         interrupted: !missing.is_empty(),
-    }))
+    })))
 }

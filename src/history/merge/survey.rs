@@ -1,11 +1,12 @@
 //! The content of a history, as far as merging needs it.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
-use crate::read::Node;
-use crate::write_campaign::campaign_node;
-use crate::write_run::run_node;
-use crate::{CampaignRecord, CampaignRow, History, OutcomeRow, RunFilter, RunRow, lists};
+use crate::campaign::RunAt;
+use crate::campaign_state::CampaignState;
+use crate::segment::LaterJudgement;
+use crate::{CampaignRecord, CampaignRow, History, RunStatus};
 use actcheck_base::{Diagnostics, Digest};
 use actcheck_verdict::Counts;
 
@@ -17,6 +18,7 @@ pub(super) struct Found {
     /// The folder of its history, as the caller gave it.
     pub(super) dir: String,
     pub(super) record: CampaignRecord,
+    pub(super) state: Arc<CampaignState>,
     pub(super) row: CampaignRow,
     /// Id that it had when it was run.
     pub(super) first_id: String,
@@ -30,12 +32,15 @@ pub(super) struct Found {
 /// A run of one of the histories.
 #[derive(Debug, Clone)]
 pub(super) struct FoundRun {
-    pub(super) row: RunRow,
+    /// RFC 3339.
+    pub(super) started: String,
+    pub(super) score: f64,
+    pub(super) status: RunStatus,
     /// Digest over everything that must be the same on every machine.
     pub(super) content: String,
     pub(super) counts: Counts,
     pub(super) discards: u64,
-    /// The judgements made after the run.
+    /// The judgements made after the run, each as one text.
     pub(super) later: BTreeSet<String>,
 }
 
@@ -90,89 +95,77 @@ impl Found {
 /// It can't be read.
 pub(super) fn survey(history: &History, source: Option<usize>) -> Result<Vec<Found>, Diagnostics> {
     let shrunk = history.selected_campaigns()?;
-    let store = history.store_with(lists::of_later_judgements)?;
-    let mut later: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-    let mut judgements =
-        lists::later_judgements(&store).map_err(|error| history.query_fault(&error))?;
-    if history.shelf().exists() {
-        judgements.extend(
-            lists::later_judgements_alone(&store).map_err(|error| history.query_fault(&error))?,
-        );
-    }
-    for (run, judgement) in judgements {
-        later.entry(run).or_default().insert(judgement);
-    }
     let mut all = Vec::new();
-    for row in history.campaigns()? {
-        let node = Node::read(&*store, &campaign_node(&row.id))
-            .map_err(|error| history.fault("reading a campaign", &error))?;
-        let runs = runs(history, &row.id, &mut later)?;
+    for state in history.campaign_states()? {
+        let id = state.record.id.clone();
+        let of_campaign = history.runs_of(&id)?;
+        let mut later: BTreeMap<u64, BTreeSet<String>> = BTreeMap::new();
+        for judgement in &of_campaign.later {
+            let texts = later.entry(judgement.index).or_default();
+            texts.insert(identity(judgement));
+        }
+        let run = |run: RunAt<'_>| {
+            let row = run.row;
+            let outcomes = row.outcomes.iter().map(|own| own.outcome);
+            let found = FoundRun {
+                started: row.started.as_ref().to_owned(),
+                score: row.score,
+                status: row.status,
+                content: content(run),
+                counts: Counts::of(outcomes),
+                discards: row.discards.into(),
+                later: later.remove(&row.index).unwrap_or_default(),
+            };
+            (row.index, found)
+        };
+        let runs: BTreeMap<u64, FoundRun> = of_campaign.iter().map(run).collect();
         all.push(Found {
             source,
             dir: history.dir().display().to_string(),
-            record: history.campaign(&row.id)?,
-            first_id: node.text("act:firstId").unwrap_or_else(|| row.id.clone()),
-            shrunk: shrunk.contains(&row.id),
+            record: state.record.clone(),
+            row: CampaignRow::of(&state, runs.len() as u64),
+            first_id: state.first_id.clone().unwrap_or_else(|| id.clone()),
+            shrunk: shrunk.contains(&id),
             runs,
-            row,
+            state,
         });
     }
     Ok(all)
 }
 
-fn runs(
-    history: &History,
-    campaign: &str,
-    later: &mut BTreeMap<String, BTreeSet<String>>,
-) -> Result<BTreeMap<u64, FoundRun>, Diagnostics> {
-    let filter = RunFilter {
-        campaign: Some(campaign.to_owned()),
-        ..RunFilter::default()
-    };
-    let mut outcomes: BTreeMap<String, Vec<OutcomeRow>> = BTreeMap::new();
-    for row in history.outcomes(&filter)? {
-        outcomes.entry(row.run.clone()).or_default().push(row);
-    }
-    let store = history.store()?;
-    let mut runs = BTreeMap::new();
-    let mut outlined: BTreeMap<String, u64> = BTreeMap::new();
-    history.each_outlined(&filter, &mut |outline| {
-        outlined.insert(outline.run(), outline.row.discards.len() as u64);
-    })?;
-    for row in history.runs(&filter)? {
-        let discards = match outlined.get(&row.run) {
-            Some(discards) => *discards,
-            None => Node::read(&*store, &run_node(&row.run))
-                .map_err(|error| history.fault("reading a run", &error))?
-                .count("act:discards")
-                .unwrap_or_default(),
-        };
-        let outcomes = outcomes.remove(&row.run).unwrap_or_default();
-        let run = FoundRun {
-            content: content(&row, &outcomes),
-            counts: Counts::of(outcomes.iter().map(|outcome| outcome.outcome)),
-            discards,
-            later: later.remove(&row.run).unwrap_or_default(),
-            row,
-        };
-        runs.insert(run.row.index, run);
-    }
-    Ok(runs)
+/// A later judgement as a text: equal for copies of the same one.
+pub(super) fn identity(later: &LaterJudgement) -> String {
+    let judgement = &later.judgement;
+    let (property, outcome, rule) = (
+        &judgement.property,
+        judgement.outcome.word(),
+        &judgement.rule_digest,
+    );
+    format!("{} {property} {} {outcome} {rule}", later.step, later.at)
 }
 
 /// Digest of a run and its outcomes, without times and ids.
-fn content(row: &RunRow, outcomes: &[OutcomeRow]) -> String {
+fn content(run: RunAt<'_>) -> String {
+    let RunAt { segment, row } = run;
     let mut digest = Digest::new();
-    for text in [&row.test, row.status.word(), &row.trace_hash] {
+    for text in [&*segment.text(row.test), row.status.word(), &row.trace_hash()] {
         digest.update(text.as_bytes());
     }
     digest.update(&row.score.to_bits().to_le_bytes());
-    for outcome in outcomes {
-        digest.update(&outcome.step.to_le_bytes());
-        for text in [&outcome.action, &outcome.property, outcome.outcome.word()] {
+    let mut outcomes: Vec<_> = row
+        .outcomes
+        .iter()
+        .map(|own| (own.action, segment.text(own.property), own))
+        .collect();
+    outcomes.sort_by(|a, b| (a.0, &a.1).cmp(&(b.0, &b.1)));
+    for (action, property, own) in outcomes {
+        digest.update(&action.to_le_bytes());
+        let number = row.actions.get(action as usize).copied().flatten();
+        let action = number.map(|number| segment.text(number));
+        for text in [action.as_deref().unwrap_or_default(), &*property, own.outcome.word()] {
             digest.update(text.as_bytes());
         }
-        digest.update(&outcome.margin.map_or(0, f64::to_bits).to_le_bytes());
+        digest.update(&own.margin.map_or(0, f64::to_bits).to_le_bytes());
     }
     digest.finish()
 }

@@ -5,7 +5,7 @@
 //! and of the frame's place. A frame that was moved, or whose size was changed, is therefore found
 //! before its size is used; only a file that ends within a frame has a torn tail.
 
-use std::io::{self, Read};
+use std::io::{self, Read, Seek, SeekFrom};
 
 use flate2::Crc;
 
@@ -18,8 +18,8 @@ const MOST_CONTENT: u32 = 1 << 30;
 /// Format of all columns: it increases with every change of the stored values.
 const FORMAT: u8 = b'1';
 
-/// The kinds of values in a segment, each in a file of its own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The kinds of values of a campaign, each in files of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum SegmentColumn {
     /// The values of runs in lists, and where the rest of each run is.
     Runs,
@@ -29,12 +29,24 @@ pub(crate) enum SegmentColumn {
     States,
     /// Motion of runs that are kept whole.
     Motion,
+    /// Judgements that were made after the runs.
+    Judgements,
+    /// The campaign itself.
+    Campaign,
 }
 
 impl SegmentColumn {
-    /// All columns, in the order in which a run is written: the frame in [`SegmentColumn::Runs`]
-    /// says that it is complete.
-    pub(crate) const ALL: [Self; 4] = [Self::Motion, Self::States, Self::Details, Self::Runs];
+    /// The columns of a run, in the order in which it is written: the frame in
+    /// [`SegmentColumn::Runs`] says that it is complete.
+    pub(crate) const OF_RUNS: [Self; 4] = [Self::Motion, Self::States, Self::Details, Self::Runs];
+    /// The columns of which a segment has one file each.
+    pub(crate) const OF_SEGMENTS: [Self; 5] = [
+        Self::Motion,
+        Self::States,
+        Self::Details,
+        Self::Runs,
+        Self::Judgements,
+    ];
 
     /// Extension of its files.
     pub(crate) fn extension(self) -> &'static str {
@@ -43,6 +55,8 @@ impl SegmentColumn {
             Self::Details => "details",
             Self::States => "states",
             Self::Motion => "motion",
+            Self::Judgements => "judgements",
+            Self::Campaign => "campaign",
         }
     }
 
@@ -53,6 +67,8 @@ impl SegmentColumn {
             Self::Details => b'd',
             Self::States => b's',
             Self::Motion => b'm',
+            Self::Judgements => b'j',
+            Self::Campaign => b'c',
         };
         [b'a', b'c', b't', b's', b'e', b'g', FORMAT, letter]
     }
@@ -141,7 +157,10 @@ fn header_sum(place: FramePlace) -> u32 {
 }
 
 /// Parses a header at `offset`.
-fn header(offset: u64, bytes: [u8; FRAME_HEADER]) -> Result<FramePlace, FrameFault> {
+///
+/// # Errors
+/// Its checksum is wrong.
+pub(super) fn place_of(offset: u64, bytes: [u8; FRAME_HEADER]) -> Result<FramePlace, FrameFault> {
     let [a, b, c, d, e, f, g, h, i, j, k, l] = bytes;
     let place = FramePlace {
         offset,
@@ -183,6 +202,22 @@ impl<R: Read> Frames<R> {
         })
     }
 
+    /// Begins to read at an offset at which a frame begins.
+    ///
+    /// # Errors
+    /// The system can't find the place.
+    pub(crate) fn at(offset: u64, mut source: R) -> io::Result<Self>
+    where
+        R: Seek,
+    {
+        source.seek(SeekFrom::Start(offset))?;
+        Ok(Self {
+            source,
+            offset,
+            is_torn: false,
+        })
+    }
+
     /// Reads the next frame into `content`. Returns `None` at the end.
     ///
     /// # Errors
@@ -198,7 +233,7 @@ impl<R: Read> Frames<R> {
             self.is_torn = read > 0;
             return Ok(None);
         }
-        let place = header(self.offset, bytes)?;
+        let place = place_of(self.offset, bytes)?;
         let size = u64::from(place.size);
         // The memory grows with the bytes that are read, not with the size that the header claims.
         self.source.by_ref().take(size).read_to_end(content)?;
@@ -218,6 +253,24 @@ impl<R: Read> Frames<R> {
     pub(crate) fn tail(&self) -> (u64, bool) {
         (self.offset, self.is_torn)
     }
+}
+
+/// All whole frames of a file, also those after damaged ones: a header has the checksum of its own
+/// place, so that the next one is found wherever it begins.
+pub(crate) fn whole_frames(bytes: &[u8]) -> Vec<(FramePlace, &[u8])> {
+    let (mut found, mut at) = (Vec::new(), HEAD.min(bytes.len()));
+    while let Some(head) = bytes[at..].first_chunk::<FRAME_HEADER>() {
+        let frame = place_of(at as u64, *head).ok().and_then(|place| {
+            let content = content_of(place, &bytes[at..]).ok()?;
+            Some((place, content))
+        });
+        at += match frame {
+            Some((place, _)) => FRAME_HEADER + place.size as usize,
+            None => 1,
+        };
+        found.extend(frame);
+    }
+    found
 }
 
 /// Reads until the buffer is full or the source ends. Returns the number of bytes.
@@ -242,7 +295,7 @@ pub(crate) fn content_of(place: FramePlace, bytes: &[u8]) -> Result<&[u8], Frame
     let (head, rest) = bytes
         .split_first_chunk::<FRAME_HEADER>()
         .ok_or(FrameFault::Missing(place.offset))?;
-    if header(place.offset, *head)? != place {
+    if place_of(place.offset, *head)? != place {
         return Err(FrameFault::Header(place.offset));
     }
     let content = rest
@@ -322,6 +375,26 @@ mod tests {
     }
 
     #[test]
+    fn frames_after_a_damaged_one_are_found() {
+        let (bytes, places) = file();
+        let found = |bytes: &[u8]| -> Vec<FramePlace> {
+            whole_frames(bytes).iter().map(|(place, _)| *place).collect()
+        };
+        assert_eq!(found(&bytes), places);
+        for at in HEAD..bytes.len() {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 1;
+            let left: Vec<FramePlace> = places
+                .iter()
+                .filter(|place| !(place.offset..place.end()).contains(&(at as u64)))
+                .copied()
+                .collect();
+            assert_eq!(found(&damaged), left, "byte {at}");
+        }
+        assert_eq!(found(b"act"), []);
+    }
+
+    #[test]
     fn another_frame_at_a_place_is_noticed() {
         let (bytes, places) = file();
         let [first, second, third] = places[..] else {
@@ -353,7 +426,7 @@ mod tests {
     #[test]
     fn files_of_other_columns_and_formats_are_refused() {
         let (bytes, _) = file();
-        let heads = SegmentColumn::ALL.map(SegmentColumn::head);
+        let heads = SegmentColumn::OF_SEGMENTS.map(SegmentColumn::head);
         assert!((1..heads.len()).all(|n| !heads[..n].contains(&heads[n])));
         let fault =
             Frames::new(SegmentColumn::Details, bytes.as_slice()).expect_err("it holds runs");

@@ -1,4 +1,4 @@
-//! The motion of runs that have only an outline.
+//! The motion of runs whose motion is not kept.
 
 use crate::History;
 use actcheck_base::{Diagnostic, Diagnostics};
@@ -10,14 +10,14 @@ pub type Restore =
     dyn Fn(&History, &str) -> Result<Option<(Vec<Choice>, Trace)>, Diagnostics> + Send + Sync;
 
 impl History {
-    /// Sets the function that makes the motion of runs that have only an outline. Without one, such
-    /// motion can't be read. Only the first call has an effect.
+    /// Sets the function that makes the motion of runs whose motion is not kept. Without one, it
+    /// can't be read. Only the first call has an effect.
     pub fn restore_with(&self, restore: Box<Restore>) {
         // A second function would do the same.
         let _ = self.restore.set(restore);
     }
 
-    /// Simulates a run that has only an outline, and returns its choices and its whole trace.
+    /// Simulates a run whose motion is not kept, and returns its choices and its whole trace.
     /// `None`: this would start a program without consent.
     ///
     /// # Errors
@@ -29,10 +29,8 @@ impl History {
         let Some((choices, trace)) = restore(self, run)? else {
             return Ok(None);
         };
-        let recorded = self
-            .outlined_states(run)?
-            .map(|(_, trace)| trace.hash)
-            .unwrap_or_default();
+        let recorded = self.with_run(run, |_, run| Ok(run.row.trace_hash()))?;
+        let recorded = recorded.unwrap_or_default();
         if trace.hash != recorded {
             let why = format!("its states have the digest {}, not {recorded}", trace.hash);
             return Err(unrestored(run, &why));

@@ -1,0 +1,401 @@
+//! RDF as a view of the stored runs: the statements that queries demand, in memory.
+
+mod dataset;
+mod demand;
+
+use std::collections::{BTreeMap, HashMap};
+use std::sync::mpsc::sync_channel;
+use std::sync::{Arc, PoisonError};
+
+use oxigraph::model::{GraphName, NamedNode, Quad};
+
+use crate::campaign::{CampaignRuns, RunAt};
+use crate::campaign_state::CampaignState;
+use crate::folder::FolderExtent;
+use crate::history::run_id;
+use crate::segment::{LaterJudgement, SegmentColumn};
+use crate::statements::{Statements, iri};
+use crate::trace_codec::decode_head;
+use crate::write_run::{RECHECKED, run_node};
+use crate::{History, fault, graphs, write_campaign, write_run};
+use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_facts::{extract, extract_complete};
+
+pub(crate) use dataset::Dataset;
+pub(crate) use demand::Demand;
+
+/// Largest number of statements in memory: they take about three gigabytes.
+const MOST_STATEMENTS: u64 = 20_000_000;
+/// Number of runs whose statements are counted before those of all runs are made.
+const SAMPLED: usize = 12;
+/// Number of runs that a thread makes statements of at a time.
+const CHUNK: usize = 64;
+/// Number of chunks that each thread is ahead.
+const AHEAD: usize = 4;
+
+/// The statements that queries have demanded so far.
+#[derive(Debug, Default)]
+pub(crate) struct View {
+    /// The state of the history that it shows.
+    extent: Arc<FolderExtent>,
+    demand: Demand,
+    taken: HashMap<String, Taken>,
+    dataset: Arc<Dataset>,
+}
+
+/// The parts of a campaign that are in a view.
+#[derive(Debug, Default)]
+struct Taken {
+    state: Option<Arc<CampaignState>>,
+    /// Number of rows of each segment, by its number.
+    rows: BTreeMap<u32, usize>,
+    later: usize,
+}
+
+/// The facts that are written into the graphs of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum WithFacts {
+    /// None.
+    No,
+    /// Those that queries ask for.
+    Lean,
+    /// All.
+    Complete,
+}
+
+/// The statements about a run, and the names of its graphs.
+#[derive(Debug, Default)]
+pub(crate) struct RunStatements {
+    pub quads: Vec<Quad>,
+    graphs: Vec<NamedNode>,
+}
+
+/// Runs of a campaign whose statements are missing in a view.
+struct Missing {
+    runs: Arc<CampaignRuns>,
+    /// Indices of the runs.
+    indices: Vec<u64>,
+}
+
+impl History {
+    /// Returns the demanded statements, and maybe others.
+    ///
+    /// # Errors
+    /// `H030` these are too many; a file is damaged or can't be read.
+    pub(crate) fn dataset(&self, demand: Demand) -> Result<Arc<Dataset>, Diagnostics> {
+        let mut view = self.view.lock().unwrap_or_else(PoisonError::into_inner);
+        let extent = self.extent()?;
+        if view.extent != extent || self.is_salvaged() {
+            self.follow(&mut view)?;
+            view.extent = extent;
+        }
+        let missing = demand.clone().beyond(&view.demand);
+        if !missing.is_empty() {
+            let all = self.missing(&HashMap::new())?;
+            let count = self.estimate(&all, &missing)?;
+            if count > MOST_STATEMENTS {
+                return Err(too_many(self, count));
+            }
+            if count + view.dataset.len() as u64 > MOST_STATEMENTS {
+                *view = View::default();
+                view.extent = self.extent()?;
+                self.follow(&mut view)?;
+                self.widen(&mut view, &all, demand)?;
+            } else {
+                self.widen(&mut view, &all, missing)?;
+            }
+        }
+        Ok(Arc::clone(&view.dataset))
+    }
+
+    /// Adds the statements of a further demand about all runs.
+    fn widen(&self, view: &mut View, all: &[Missing], demand: Demand) -> Result<(), Diagnostics> {
+        let dataset = Arc::make_mut(&mut view.dataset);
+        let added = self.add_campaigns(&demand, dataset);
+        let added = added.and_then(|()| self.add_runs(all, &demand, dataset));
+        dataset.merge_pending();
+        added?;
+        view.demand.add(demand);
+        Ok(())
+    }
+
+    fn add_campaigns(&self, demand: &Demand, dataset: &mut Dataset) -> Result<(), Diagnostics> {
+        for state in self.campaign_states()? {
+            let mut statements = Statements::new(demand);
+            write_campaign::write(&state, &mut statements);
+            dataset.extend(statements.quads);
+        }
+        Ok(())
+    }
+
+    /// Adds the statements of runs and judgements that are new since the state that a view shows.
+    fn follow(&self, view: &mut View) -> Result<(), Diagnostics> {
+        let states = self.campaign_states()?;
+        let is_changed = |state: &Arc<CampaignState>| {
+            let known = view.taken.get(&state.record.id);
+            known.and_then(|taken| taken.state.as_ref()).is_some_and(|before| {
+                // An end that is added leaves the other statements as they are.
+                let mut grown = (**before).clone();
+                grown.end = grown.end.or_else(|| state.end.clone());
+                grown.segments = state.segments.clone();
+                grown != **state
+            })
+        };
+        if states.iter().any(is_changed) {
+            let demand = std::mem::take(&mut view.demand);
+            *view = View {
+                demand,
+                ..View::default()
+            };
+        }
+        let missing = self.missing(&view.taken)?;
+        if !view.demand.is_empty() {
+            let demand = view.demand.clone();
+            let dataset = Arc::make_mut(&mut view.dataset);
+            let added = self.add_campaigns(&demand, dataset);
+            let added = added.and_then(|()| self.add_runs(&missing, &demand, dataset));
+            dataset.merge_pending();
+            if let Err(faults) = added {
+                // It is made anew by the next query.
+                *view = View::default();
+                return Err(faults);
+            }
+        }
+        for state in states {
+            let id = state.record.id.clone();
+            let runs = self.runs_of(&id)?;
+            let rows = runs.segments.iter();
+            let rows = rows.map(|segment| (segment.number(), segment.rows().len()));
+            let taken = Taken {
+                state: Some(state),
+                rows: rows.collect(),
+                later: runs.later.len(),
+            };
+            view.taken.insert(id, taken);
+        }
+        Ok(())
+    }
+
+    /// The runs of each campaign that have not been taken, or were judged since.
+    fn missing(&self, taken: &HashMap<String, Taken>) -> Result<Vec<Missing>, Diagnostics> {
+        let mut missing = Vec::new();
+        for state in self.campaign_states()? {
+            let id = &state.record.id;
+            let runs = self.runs_of(id)?;
+            let indices = match taken.get(id) {
+                None => runs.iter().map(|run| run.row.index).collect(),
+                Some(taken) => {
+                    let mut indices = Vec::new();
+                    for segment in &runs.segments {
+                        let known = taken.rows.get(&segment.number()).copied();
+                        let new = &segment.rows()[known.unwrap_or_default()..];
+                        indices.extend(new.iter().map(|row| row.index));
+                    }
+                    indices.extend(runs.later[taken.later..].iter().map(|own| own.index));
+                    indices.sort_unstable();
+                    indices.dedup();
+                    indices
+                }
+            };
+            missing.push(Missing { runs, indices });
+        }
+        Ok(missing)
+    }
+
+    /// The number of demanded statements about runs, from those about a few of them.
+    fn estimate(&self, all: &[Missing], demand: &Demand) -> Result<u64, Diagnostics> {
+        let total: usize = all.iter().map(|of| of.indices.len()).sum();
+        if total == 0 {
+            return Ok(0);
+        }
+        let step = total.div_ceil(SAMPLED);
+        let runs = all
+            .iter()
+            .flat_map(|of| of.indices.iter().map(move |index| (of, *index)));
+        let (mut sampled, mut count) = (0, 0);
+        for (of, index) in runs.step_by(step) {
+            if let Some(run) = of.runs.find(index) {
+                let later = of.runs.later_of(index);
+                let source = Source::new(self, &of.runs.id);
+                let made = source.statements(run, &later, demand, WithFacts::Lean)?;
+                count += made.quads.len();
+                sampled += 1;
+            }
+        }
+        Ok((count * total / sampled.max(1)) as u64)
+    }
+
+    /// Adds the demanded statements about runs. Several threads make them; the order in which they
+    /// are added does not depend on their number.
+    fn add_runs(
+        &self,
+        missing: &[Missing],
+        demand: &Demand,
+        dataset: &mut Dataset,
+    ) -> Result<(), Diagnostics> {
+        let chunks: Vec<(&CampaignRuns, &[u64])> = missing
+            .iter()
+            .flat_map(|of| of.indices.chunks(CHUNK).map(|chunk| (&*of.runs, chunk)))
+            .collect();
+        let make = |(runs, indices): (&CampaignRuns, &[u64])| {
+            let source = Source::new(self, &runs.id);
+            let mut made = Vec::with_capacity(indices.len());
+            for index in indices {
+                let Some(run) = runs.find(*index) else {
+                    continue;
+                };
+                let later = runs.later_of(*index);
+                made.push(source.statements(run, &later, demand, WithFacts::Lean)?);
+            }
+            Ok::<_, Diagnostics>(made)
+        };
+        let mut take = |made: Vec<RunStatements>| {
+            for RunStatements { quads, graphs } in made {
+                dataset.extend(quads);
+                for graph in graphs {
+                    dataset.add_graph(graph.as_ref().into());
+                }
+            }
+        };
+        let threads = self.threads().min(chunks.len());
+        if threads < 2 {
+            for chunk in chunks {
+                take(make(chunk)?);
+            }
+            return Ok(());
+        }
+        std::thread::scope(|scope| {
+            let receivers: Vec<_> = (0..threads)
+                .map(|thread| {
+                    let (sender, receiver) = sync_channel(AHEAD);
+                    let (chunks, make) = (&chunks, &make);
+                    scope.spawn(move || {
+                        for chunk in chunks.iter().skip(thread).step_by(threads) {
+                            let made = make(*chunk);
+                            let is_last = made.is_err();
+                            // Without a receiver, no further chunk is needed.
+                            if sender.send(made).is_err() || is_last {
+                                return;
+                            }
+                        }
+                    });
+                    receiver
+                })
+                .collect();
+            for number in 0..chunks.len() {
+                // A thread that ended without its chunk has panicked, which the scope reports.
+                if let Ok(made) = receivers[number % threads].recv() {
+                    take(made?);
+                }
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Makes the statements about runs of a campaign.
+#[derive(Clone, Copy)]
+pub(crate) struct Source<'h> {
+    history: &'h History,
+    campaign: &'h str,
+}
+
+impl<'h> Source<'h> {
+    pub(crate) fn new(history: &'h History, campaign: &'h str) -> Self {
+        Self { history, campaign }
+    }
+
+    /// The demanded statements about a run. `later`: its later judgements.
+    ///
+    /// # Errors
+    /// `H007` the run is damaged.
+    pub(crate) fn statements(
+        &self,
+        run: RunAt<'_>,
+        later: &[&LaterJudgement],
+        demand: &Demand,
+        facts: WithFacts,
+    ) -> Result<RunStatements, Diagnostics> {
+        let id = run_id(self.campaign, run.row.index);
+        let node = run_node(&id);
+        let rechecked = iri(RECHECKED);
+        let mut made = RunStatements::default();
+        if demand.has_details_of(&node, rechecked.as_str()) {
+            let unread =
+                |why| fault::run(&self.history.folder, &id, run, SegmentColumn::Details, &why);
+            let stored = run.segment.run(run.row).map_err(unread)?;
+            let mut statements = Statements::new(demand);
+            write_run::write(&stored, self.campaign, &mut statements);
+            made.quads = statements.quads;
+            if !later.is_empty() {
+                let mut statements = Statements::in_graph(demand, Some(rechecked.clone()));
+                write_run::write_later(&stored, self.campaign, later, &mut statements);
+                made.quads.extend(statements.quads);
+            }
+        }
+        if !later.is_empty() && demand.has_graph(rechecked.as_str()) {
+            made.graphs.push(rechecked);
+        }
+        if facts != WithFacts::No && demand.has_facts_of(&node) {
+            self.add_facts(&id, run, demand, facts, &mut made)?;
+        }
+        Ok(made)
+    }
+
+    fn add_facts(
+        &self,
+        id: &str,
+        run: RunAt<'_>,
+        demand: &Demand,
+        facts: WithFacts,
+        made: &mut RunStatements,
+    ) -> Result<(), Diagnostics> {
+        let folder = &self.history.folder;
+        let unread = |why| fault::run(folder, id, run, SegmentColumn::States, &why);
+        let states = run.segment.states(run.row);
+        let (_, trace) = decode_head(&states.map_err(unread)?).map_err(|why| {
+            fault::undecodable(folder, id, run, SegmentColumn::States, &why.to_string())
+        })?;
+        let node = run_node(id);
+        let quads = match facts {
+            WithFacts::Complete => graphs::complete(&extract_complete(&trace), &node),
+            WithFacts::Lean | WithFacts::No => {
+                let mut quads = Vec::new();
+                graphs::write(&extract(&trace), &node, &mut quads);
+                quads
+            }
+        };
+        let mut last = None;
+        for quad in quads {
+            let GraphName::NamedNode(graph) = &quad.graph_name else {
+                continue;
+            };
+            if last.as_ref() != Some(graph) {
+                if demand.has_graph(graph.as_str()) {
+                    made.graphs.push(graph.clone());
+                }
+                last = Some(graph.clone());
+            }
+            let (subject, property) = (quad.subject.as_ref(), quad.predicate.as_str());
+            if demand.has(subject, property, quad.object.as_ref(), Some(graph.as_str())) {
+                made.quads.push(quad);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The error of a query that needs too many statements.
+fn too_many(history: &History, count: u64) -> Diagnostics {
+    let message = format!(
+        "the query needs about {} million statements about the runs of `{}`, more than fit in memory",
+        count.div_ceil(1_000_000),
+        history.dir().display(),
+    );
+    Diagnostic::error("H030", message)
+        .help(
+            "ask for fewer properties, or for one campaign's runs in a history of its own (`actcheck merge`); or export tables \
+             (`actcheck export tables DIR`), for which docs/history.md has the shipped questions",
+        )
+        .into()
+}
