@@ -3,6 +3,7 @@
 pub mod checkout;
 pub mod chromium;
 pub mod expected;
+pub mod exported;
 pub mod foreign;
 pub mod line;
 pub mod look;
