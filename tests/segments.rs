@@ -1,14 +1,22 @@
-//! The journal of a history: its statements can be read at once, survives a kill, and ends in
-//! compressed tables.
+//! The segments of a history: runs in them can be read at once, survive a kill, take few bytes, and
+//! are saved when others are damaged.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
+use actcheck::history::merge::{MergeOptions, carry_out, plan};
 use actcheck::history::{CampaignEnd, History, QueryAnswer, RunFilter, RunStatus};
 use tempfile::TempDir;
 
+use crate::facts::sample_trace;
+use crate::fuzz_corpus::entrances::frames;
 use crate::history::{sample_campaign, sample_run};
-use crate::support::{actcheck, copy, copy_open, stderr, stdout};
+use crate::support::exported::{Exported, statements};
+use crate::support::{actcheck, copy, stderr, stdout};
+
+/// The columns of a segment in which every run has a frame.
+const COLUMNS: [&str; 4] = ["runs", "details", "states", "motion"];
 
 /// The folder of a history with a campaign that has not ended, as its owner left it when it was
 /// killed.
@@ -18,8 +26,20 @@ fn killed(runs: u64) -> (TempDir, PathBuf) {
     let history = History::open(&live).unwrap();
     history.begin_campaign(&sample_campaign("k", 0)).unwrap();
     (0..runs).for_each(|index| history.commit(&sample_run("k", index)).unwrap());
-    copy_open(&live, &left);
+    copy(&live, &left);
     (folder, left)
+}
+
+fn end() -> CampaignEnd {
+    CampaignEnd {
+        ended: "2026-08-01T13:00:00Z".to_owned(),
+        ..CampaignEnd::default()
+    }
+}
+
+/// A column of the first segment of the campaign `k`.
+fn column(history: &Path, extension: &str) -> PathBuf {
+    history.join("campaigns/k/0001").with_extension(extension)
 }
 
 fn runs(history: &History) -> Vec<String> {
@@ -31,166 +51,537 @@ fn runs(history: &History) -> Vec<String> {
         .collect()
 }
 
-/// All statements of a history as lines.
-fn statements(history: &History) -> BTreeSet<String> {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("all.nq");
-    history.write_nquads(&file).unwrap();
-    std::fs::read_to_string(file)
-        .unwrap()
-        .lines()
-        .map(str::to_owned)
+/// The ids of the first runs of the campaign `k`.
+fn first(count: usize) -> Vec<String> {
+    (1..=count).map(|number| format!("k-{number}")).collect()
+}
+
+fn is_warned(history: &History) -> bool {
+    let warning = history.tail_warning().unwrap();
+    assert!(
+        warning
+            .as_ref()
+            .is_none_or(|warning| warning.code == "H029")
+    );
+    warning.is_some()
+}
+
+/// The content of every file of the campaign `k`.
+fn contents(history: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let entries = std::fs::read_dir(history.join("campaigns/k")).unwrap();
+    let paths = entries.map(|entry| entry.unwrap().path());
+    paths
+        .map(|path| (path.clone(), std::fs::read(&path).unwrap()))
         .collect()
 }
 
-fn size_of(folder: &Path, ending: &str) -> u64 {
-    let files = std::fs::read_dir(folder).unwrap().map(Result::unwrap);
-    let wanted = files.filter(|file| file.file_name().to_string_lossy().ends_with(ending));
-    wanted.map(|file| file.metadata().unwrap().len()).sum()
+/// Adds frames to a column, which repeat its last one, and leaves off some bytes at the end.
+fn add_frames(file: &Path, count: usize, missing: usize) {
+    let whole = std::fs::read(file).unwrap();
+    let mut contents = frames::contents(&whole);
+    let last = *contents.last().unwrap();
+    contents.extend(vec![last; count]);
+    let written = frames::file(&whole, &contents);
+    assert!(written.starts_with(&whole));
+    std::fs::write(file, &written[..written.len() - missing]).unwrap();
+}
+
+/// Otherwise the tests of other contents would test damage.
+#[test]
+fn the_program_and_the_tests_agree_on_the_form_of_frames() {
+    let (_folder, left) = killed(3);
+    for extension in COLUMNS {
+        let bytes = std::fs::read(column(&left, extension)).unwrap();
+        let contents = frames::contents(&bytes);
+        assert_eq!(contents.len(), 3, "{extension}");
+        assert_eq!(&bytes[..6], b"actseg", "{extension}");
+        assert!(bytes == frames::file(&bytes, &contents), "{extension}");
+        let rows = std::fs::read(column(&left, "runs")).unwrap();
+        if extension != "runs" {
+            // Each run has the place of its frame.
+            let other = vec![b"other".as_slice(); 3];
+            let other = frames::file(&bytes, &other);
+            let repointed = frames::repointed(&rows, &bytes, &other);
+            let pairs = frames::contents(&rows);
+            let changed = pairs.iter().zip(frames::contents(&repointed));
+            assert!(changed.into_iter().all(|(own, new)| *own != new));
+            assert!(frames::repointed(&repointed, &other, &bytes) == rows);
+        }
+    }
+    let campaign = std::fs::read(left.join("campaigns/k/campaign")).unwrap();
+    assert!(campaign == frames::file(&campaign, &frames::contents(&campaign)));
 }
 
 #[test]
-fn the_next_owner_takes_over_the_runs_of_a_killed_one() {
+fn the_next_owner_has_the_runs_of_a_killed_one_and_writes_a_segment_of_its_own() {
     let (_folder, left) = killed(3);
-    assert!(left.join("journal").metadata().unwrap().len() > 0);
-    // It was killed while it wrote tables.
-    std::fs::write(left.join("store/bulk-7.sst"), "half").unwrap();
     let before = statements(&History::open_to_read(&left).unwrap());
+    // It was killed while it wrote the fourth run.
+    add_frames(&column(&left, "motion"), 1, 0);
+    add_frames(&column(&left, "states"), 1, 0);
+    add_frames(&column(&left, "details"), 1, 5);
+    let files = contents(&left);
+    let reader = History::open_to_read(&left).unwrap();
+    assert_eq!((runs(&reader), is_warned(&reader)), (first(3), false));
+    assert_eq!(statements(&reader), before);
+    drop(reader);
     let history = History::open(&left).unwrap();
-    assert!(!left.join("store/bulk-7.sst").exists());
-    assert_eq!(runs(&history), ["k-1", "k-2", "k-3"]);
+    assert_eq!(runs(&history), first(3));
     assert_eq!(statements(&history), before);
-    assert!(!left.join("journal").exists());
-    // Traces of runs in the journal are not leftovers.
+    history.commit(&sample_run("k", 3)).unwrap();
+    history.commit_outcomes(&sample_run("k", 4)).unwrap();
+    assert_eq!(runs(&history), first(5));
+    drop(history);
+    // Nothing that was written before has changed, except that the campaign has more states.
+    let now = contents(&left);
+    for (file, before) in &files {
+        assert!(now[file].starts_with(before), "{}", file.display());
+        assert!(
+            now[file].len() == before.len() || file.ends_with("campaign"),
+            "{}",
+            file.display()
+        );
+    }
+    assert!(now.contains_key(&left.join("campaigns/k/0002.runs")));
+    let history = History::open(&left).unwrap();
     history
         .begin_campaign(&sample_campaign("later", 1))
         .unwrap();
-    assert!((0..3).all(|index| history.trace(&format!("k-{}", index + 1)).is_ok()));
-}
-
-#[test]
-fn a_kill_between_the_store_and_the_journal_stores_nothing_twice() {
-    let (_folder, left) = killed(2);
-    let journal = std::fs::read(left.join("journal")).unwrap();
-    let before = statements(&History::open_existing(&left).unwrap());
-    std::fs::write(left.join("journal"), journal).unwrap();
-    assert_eq!(statements(&History::open_to_read(&left).unwrap()), before);
-    assert_eq!(statements(&History::open_existing(&left).unwrap()), before);
-}
-
-#[test]
-fn half_a_record_at_the_end_of_a_journal_is_not_a_run() {
-    let (_folder, left) = killed(3);
-    let journal = std::fs::read(left.join("journal")).unwrap();
-    std::fs::write(left.join("journal"), &journal[..journal.len() - 1]).unwrap();
-    assert_eq!(runs(&History::open_to_read(&left).unwrap()), ["k-1", "k-2"]);
-    assert_eq!(
-        runs(&History::open_existing(&left).unwrap()),
-        ["k-1", "k-2"]
-    );
-}
-
-#[test]
-fn damage_to_a_journal_is_reported_and_the_other_runs_are_saved() {
-    let (folder, left) = killed(3);
-    let mut journal = std::fs::read(left.join("journal")).unwrap();
-    // In the content of the last record.
-    let last = journal.len() - 1;
-    journal[last] ^= 4;
-    std::fs::write(left.join("journal"), journal).unwrap();
-    for opened in [History::open_to_read(&left), History::open_existing(&left)] {
-        let fault = opened.err().unwrap().to_string();
-        assert!(
-            fault.starts_with("H007") && fault.contains("journal"),
-            "{fault}"
-        );
+    history.finish_campaign("k", &end()).unwrap();
+    assert_eq!(runs(&history), first(5));
+    for index in 0..4 {
+        let trace = history.trace(&format!("k-{}", index + 1)).unwrap();
+        assert_eq!(trace, sample_trace(index));
     }
-    let name = left.display().to_string();
-    let output = actcheck(
-        folder.path(),
-        &["health", "--integrity", "--history", &name],
-    );
-    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    assert!(!history.is_whole("k-5").unwrap());
+    drop(history);
+    let (found, history) = History::examine(&left).unwrap();
+    assert_eq!((found.damage, found.runs), (Vec::new(), 5));
+    // The next owner leaves the frames without a run, and says so.
+    let unused: Vec<PathBuf> = ["details", "motion", "states"]
+        .map(|extension| Path::new("campaigns/k/0001").with_extension(extension))
+        .to_vec();
+    assert_eq!(found.unused, unused);
+    assert!(!is_warned(&history));
+}
+
+/// Wherever a kill cuts the list of runs, the runs before are read, and a lost run that was reported
+/// is noticed.
+#[test]
+fn a_torn_tail_is_not_a_run() {
+    let (_folder, left) = killed(3);
+    let file = column(&left, "runs");
+    let whole = std::fs::read(&file).unwrap();
+    let ends = frames::ends(&whole);
+    let near = |length: usize| {
+        ends.iter()
+            .chain([&0, &frames::HEAD])
+            .any(|end| length.abs_diff(*end) < frames::HEADER + 2)
+    };
+    for length in (0..=whole.len()).filter(|length| near(*length) || length % 7 == 0) {
+        std::fs::write(&file, &whole[..length]).unwrap();
+        let complete = ends.iter().filter(|end| **end <= length).count();
+        let is_border = length == frames::HEAD || ends.contains(&length);
+        let reader = History::open_to_read(&left).unwrap();
+        assert_eq!(runs(&reader), first(complete), "{length} bytes");
+        // A process that is killed between two files leaves one run without a frame in the list.
+        let is_lost = !is_border || complete < 2;
+        assert_eq!(is_warned(&reader), is_lost, "{length} bytes");
+        for index in 0..complete as u64 {
+            let run = format!("k-{}", index + 1);
+            assert_eq!(reader.trace(&run).unwrap(), sample_trace(index));
+        }
+    }
+    // The same for the next owner, who makes the lost run again.
+    let length = ends[2] - 1;
+    std::fs::write(&file, &whole[..length]).unwrap();
+    let history = History::open_existing(&left).unwrap();
+    assert_eq!((runs(&history), is_warned(&history)), (first(2), true));
+    history.commit(&sample_run("k", 2)).unwrap();
+    history.finish_campaign("k", &end()).unwrap();
+    assert_eq!(runs(&history), first(3));
+    drop(history);
+    let (found, history) = History::examine(&left).unwrap();
+    assert_eq!((found.damage, found.runs), (Vec::new(), 3));
     assert!(
-        stdout(&output).contains("journal") && stdout(&output).contains("k-3"),
-        "{}",
-        stdout(&output)
+        found
+            .unused
+            .contains(&PathBuf::from("campaigns/k/0001.runs")),
+        "{:?}",
+        found.unused
     );
-    let output = actcheck(
-        folder.path(),
-        &["merge", "--salvage", &name, "--into", "saved"],
+    // The campaign is complete without it.
+    assert!(!is_warned(&history));
+}
+
+/// While an owner writes, a torn tail is a run that it is writing.
+#[test]
+fn a_torn_tail_of_a_running_process_is_no_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("h");
+    let owner = History::open(&dir).unwrap();
+    owner.begin_campaign(&sample_campaign("k", 0)).unwrap();
+    (0..3).for_each(|index| owner.commit(&sample_run("k", index)).unwrap());
+    let file = column(&dir, "runs");
+    let whole = std::fs::read(&file).unwrap();
+    std::fs::write(&file, &whole[..whole.len() - 3]).unwrap();
+    let reader = History::open_to_read(&dir).unwrap();
+    assert_eq!((runs(&reader), is_warned(&reader)), (first(2), false));
+    drop(owner);
+    let reader = History::open_to_read(&dir).unwrap();
+    assert_eq!((runs(&reader), is_warned(&reader)), (first(2), true));
+}
+
+/// A process that is killed leaves one run of which only some columns have a frame. Two such runs
+/// have been reported, and lost from the list.
+#[test]
+fn frames_without_a_run_are_harmless_or_a_lost_run() {
+    for (count, is_lost) in [(1, false), (2, true)] {
+        let (_folder, left) = killed(3);
+        for extension in ["motion", "states", "details"] {
+            add_frames(&column(&left, extension), count, 0);
+        }
+        let before = contents(&left);
+        let reader = History::open_to_read(&left).unwrap();
+        assert_eq!((runs(&reader), is_warned(&reader)), (first(3), is_lost));
+        let (found, _) = History::examine(&left).unwrap();
+        assert_eq!(found.damage.is_empty(), !is_lost, "{found:?}");
+        assert!(
+            is_lost
+                || found
+                    .unused
+                    .contains(&PathBuf::from("campaigns/k/0001.details")),
+            "{found:?}"
+        );
+        assert_eq!(contents(&left), before, "readers change nothing");
+        let owner = History::open_existing(&left).unwrap();
+        assert_eq!((runs(&owner), is_warned(&owner)), (first(3), is_lost));
+    }
+}
+
+/// A kill while the campaign's state is written leaves the state before.
+#[test]
+fn a_torn_state_of_a_campaign_is_the_state_before() {
+    let (_folder, left) = killed(3);
+    let file = left.join("campaigns/k/campaign");
+    let before = std::fs::read(&file).unwrap();
+    let history = History::open_existing(&left).unwrap();
+    history.finish_campaign("k", &end()).unwrap();
+    drop(history);
+    let after = std::fs::read(&file).unwrap();
+    assert!(after.len() > before.len() && after.starts_with(&before));
+    for length in before.len()..after.len() {
+        std::fs::write(&file, &after[..length]).unwrap();
+        let history = History::open_to_read(&left).unwrap();
+        let row = history.campaigns().unwrap().remove(0);
+        assert_eq!((row.runs, row.ended, row.interrupted), (3, None, true));
+        assert_eq!(runs(&history), first(3));
+    }
+    // The next owner ends it.
+    std::fs::write(&file, &after[..after.len() - 1]).unwrap();
+    let history = History::open_existing(&left).unwrap();
+    history.finish_campaign("k", &end()).unwrap();
+    drop(history);
+    let (found, history) = History::examine(&left).unwrap();
+    assert_eq!((found.damage, found.runs), (Vec::new(), 3));
+    let row = history.campaigns().unwrap().remove(0);
+    assert_eq!((row.runs, row.interrupted), (3, false));
+}
+
+/// A kill at the very start of a campaign leaves a folder in which nothing is complete.
+#[test]
+fn a_campaign_that_was_never_recorded_is_none() {
+    let (_folder, left) = killed(3);
+    let other = left.join("campaigns/q");
+    let recorded = std::fs::read(left.join("campaigns/k/campaign")).unwrap();
+    for length in [None, Some(0), Some(3), Some(frames::HEAD), Some(30)] {
+        let _ = std::fs::remove_dir_all(&other);
+        std::fs::create_dir(&other).unwrap();
+        if let Some(length) = length {
+            std::fs::write(other.join("campaign"), &recorded[..length]).unwrap();
+        }
+        let reader = History::open_to_read(&left).unwrap();
+        assert_eq!(reader.campaigns().unwrap().len(), 1, "{length:?}");
+        assert_eq!(runs(&reader), first(3), "{length:?}");
+        assert_eq!(History::count_runs(&left), 3);
+        let owner = History::open_existing(&left).unwrap();
+        owner.begin_campaign(&sample_campaign("q", 3)).unwrap();
+        owner.commit(&sample_run("q", 0)).unwrap();
+        drop(owner);
+        let reader = History::open_to_read(&left).unwrap();
+        assert_eq!(reader.campaigns().unwrap().len(), 2, "{length:?}");
+        assert_eq!(runs(&reader).len(), 4, "{length:?}");
+    }
+}
+
+#[test]
+fn an_empty_history_has_empty_lists() {
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("h");
+    drop(History::open(&dir).unwrap());
+    let version = std::fs::read_to_string(dir.join("VERSION")).unwrap();
+    assert_eq!(version, "actcheck history 5\n");
+    let reader = History::open_to_read(&dir).unwrap();
+    let all = RunFilter::default();
+    assert_eq!((runs(&reader).len(), History::count_runs(&dir)), (0, 0));
+    assert!(reader.campaigns().unwrap().is_empty() && reader.outcomes(&all).unwrap().is_empty());
+    assert!(statements(&reader).is_empty() && !is_warned(&reader));
+    assert_eq!(
+        reader.query("ASK { ?s ?p ?o }").unwrap(),
+        QueryAnswer::Boolean(false)
     );
+    let (found, _) = History::examine(&dir).unwrap();
+    assert_eq!((found.damage, found.runs), (Vec::new(), 0));
+    assert_eq!(History::count_runs(&folder.path().join("none")), 0);
+}
+
+/// What is salvaged, and whether the run `k-3` is whole then.
+fn salvaged(folder: &Path, left: &Path) -> (Vec<String>, Option<bool>, String) {
+    let _ = std::fs::remove_dir_all(folder.join("saved"));
+    let name = left.display().to_string();
+    let output = actcheck(folder, &["merge", "--salvage", &name, "--into", "saved"]);
     assert!(
         output.status.code().is_some_and(|code| code < 2),
         "{}",
         stderr(&output)
     );
-    assert_eq!(
-        runs(&History::open_to_read(&folder.path().join("saved")).unwrap()),
-        ["k-1", "k-2"]
-    );
+    let saved = History::open_to_read(&folder.join("saved")).unwrap();
+    let ids = runs(&saved);
+    for run in &ids {
+        let index = saved.run(run).unwrap().row.index;
+        assert_eq!(saved.run(run).unwrap().actions[0].judgements.len(), 5);
+        if saved.is_whole(run).unwrap() {
+            assert_eq!(saved.trace(run).unwrap(), sample_trace(index));
+        }
+        assert_eq!(saved.choices(run).unwrap(), sample_run("k", index).choices);
+    }
+    let is_whole = ids
+        .contains(&"k-3".to_owned())
+        .then(|| saved.is_whole("k-3").unwrap());
+    drop(saved);
+    let (found, _) = History::examine(&folder.join("saved")).unwrap();
+    assert!(found.damage.is_empty(), "{found:?}");
+    (ids, is_whole, stderr(&output))
 }
 
-/// A statement takes about 240 bytes in tables that are not compressed, and 500 in the store's own
-/// log.
 #[test]
-fn a_campaign_ends_in_compressed_tables_with_the_same_statements() {
+fn damage_to_a_column_is_reported_and_the_other_runs_are_saved() {
+    // In the content and in the header of the last frame.
+    for extension in COLUMNS {
+        for in_header in [false, true] {
+            let (folder, left) = killed(3);
+            let place = format!("campaigns/k/0001.{extension}");
+            let file = column(&left, extension);
+            let mut bytes = std::fs::read(&file).unwrap();
+            let at = match in_header {
+                true => frames::ends(&bytes)[1] + 5,
+                false => bytes.len() - 1,
+            };
+            bytes[at] ^= 4;
+            std::fs::write(&file, bytes).unwrap();
+            for opened in [History::open_to_read(&left), History::open_existing(&left)] {
+                // A column is read when its values are asked for.
+                let fault = opened
+                    .and_then(|history| {
+                        history.runs(&RunFilter::default())?;
+                        history.run("k-3")?;
+                        history.trace("k-3")
+                    })
+                    .map(drop)
+                    .unwrap_err()
+                    .to_string();
+                assert!(
+                    fault.starts_with("H007") && fault.contains(&place),
+                    "{fault}"
+                );
+            }
+            // Others are not concerned.
+            if extension != "runs" {
+                let history = History::open_to_read(&left).unwrap();
+                assert_eq!(runs(&history), first(3));
+                assert_eq!(history.trace("k-2").unwrap(), sample_trace(1));
+                assert_eq!(history.run("k-2").unwrap().actions.len(), 1);
+            }
+            let name = left.display().to_string();
+            let output = actcheck(
+                folder.path(),
+                &["health", "--integrity", "--history", &name],
+            );
+            assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+            assert!(
+                stdout(&output).contains(&place)
+                    && (extension == "runs" || stdout(&output).contains("k-3")),
+                "{}",
+                stdout(&output)
+            );
+            let (ids, is_whole, said) = salvaged(folder.path(), &left);
+            match extension {
+                "runs" => assert_eq!((ids, is_whole), (first(3), Some(true))),
+                "motion" => assert_eq!((ids, is_whole), (first(3), Some(false))),
+                _ => {
+                    assert_eq!((ids, is_whole), (first(2), None));
+                    assert!(said.contains("k-3"), "{said}");
+                }
+            }
+        }
+    }
+}
+
+/// A column that has lost its end or is missing: each run says where its frames are.
+#[test]
+fn runs_whose_frames_are_missing_are_reported() {
+    for extension in ["details", "states", "motion"] {
+        let (folder, left) = killed(3);
+        let place = format!("campaigns/k/0001.{extension}");
+        let file = column(&left, extension);
+        let whole = std::fs::read(&file).unwrap();
+        let ends = frames::ends(&whole);
+        for length in [Some(ends[2] - 1), Some(ends[1]), Some(0), None] {
+            match length {
+                Some(length) => std::fs::write(&file, &whole[..length]).unwrap(),
+                None => std::fs::remove_file(&file).unwrap(),
+            }
+            let history = History::open_to_read(&left).unwrap();
+            assert_eq!(runs(&history), first(3));
+            let read = history
+                .run("k-3")
+                .map(drop)
+                .and_then(|()| history.trace("k-3").map(drop));
+            let fault = read.unwrap_err().to_string();
+            assert!(
+                ["H007", "H009"].iter().any(|code| fault.starts_with(code))
+                    && fault.contains(&place),
+                "{fault}"
+            );
+            let (found, _) = History::examine(&left).unwrap();
+            assert!(
+                found
+                    .damage
+                    .iter()
+                    .any(|damage| damage.file == Path::new(&place)),
+                "{found:?}"
+            );
+            let (ids, is_whole, _) = salvaged(folder.path(), &left);
+            let is_lost = extension != "motion";
+            let saved = match length {
+                _ if !is_lost => first(3),
+                Some(length) if length > 0 => first(2),
+                _ => first(0),
+            };
+            assert_eq!((ids, is_whole), (saved, (!is_lost).then_some(false)));
+        }
+    }
+}
+
+/// A frame of another place, with right checksums of its own, is not taken for the one that a run
+/// has.
+#[test]
+fn spliced_frames_are_found() {
+    let (_folder, left) = killed(3);
+    for extension in COLUMNS {
+        let file = column(&left, extension);
+        let whole = std::fs::read(&file).unwrap();
+        let contents = frames::contents(&whole);
+        let swapped = [contents[0], contents[2], contents[1]];
+        let ends = frames::ends(&whole);
+        let moved = [
+            &whole[..ends[0]],
+            &whole[ends[1]..],
+            &whole[ends[0]..ends[1]],
+        ]
+        .concat();
+        for written in [frames::file(&whole, &swapped), moved] {
+            assert_ne!(written, whole);
+            std::fs::write(&file, written).unwrap();
+            let (found, _) = History::examine(&left).unwrap();
+            // Rows that are in another order, with right checksums, are the same rows.
+            assert!(
+                extension == "runs" || !found.damage.is_empty(),
+                "{extension}: {found:?}"
+            );
+            let read = History::open_to_read(&left).and_then(|history| {
+                history.runs(&RunFilter::default())?;
+                for index in 0..3 {
+                    let run = format!("k-{}", index + 1);
+                    history.run(&run)?;
+                    assert_eq!(history.trace(&run)?, sample_trace(index), "{extension}");
+                }
+                Ok(())
+            });
+            match read {
+                Ok(()) => assert_eq!(extension, "runs"),
+                Err(faults) => assert!(faults.iter().all(|fault| fault.code == "H007")),
+            }
+        }
+        std::fs::write(&file, whole).unwrap();
+    }
+}
+
+/// Runs of a campaign are much alike.
+#[test]
+fn a_run_takes_few_bytes() {
+    const RUNS: u64 = 60;
     let folder = tempfile::tempdir().unwrap();
-    let dir = folder.path().join("h");
-    let history = History::open(&dir).unwrap();
-    history.begin_campaign(&sample_campaign("k", 0)).unwrap();
-    (0..60).for_each(|index| history.commit(&sample_run("k", index)).unwrap());
-    let before = statements(&History::open_to_read(&dir).unwrap());
-    let journal = dir.join("journal").metadata().unwrap().len();
-    let end = CampaignEnd {
-        ended: "2026-08-01T13:00:00Z".to_owned(),
-        ..CampaignEnd::default()
+    let size = |is_whole: bool| {
+        let dir = folder.path().join(format!("{is_whole}"));
+        let history = History::open(&dir).unwrap();
+        history.begin_campaign(&sample_campaign("k", 0)).unwrap();
+        for index in 0..RUNS {
+            let run = sample_run("k", index);
+            if is_whole {
+                history.commit(&run).unwrap()
+            } else {
+                history.commit_outcomes(&run).unwrap()
+            }
+        }
+        let before = statements(&History::open_to_read(&dir).unwrap());
+        history.finish_campaign("k", &end()).unwrap();
+        drop(history);
+        let after = statements(&History::open_to_read(&dir).unwrap());
+        assert!(before.is_subset(&after) && after.len() > 5_000);
+        assert!(
+            (1..20).contains(&(after.len() - before.len())),
+            "{}",
+            after.len() - before.len()
+        );
+        let sizes: BTreeMap<String, u64> = contents(&dir)
+            .iter()
+            .map(|(file, bytes)| {
+                let kind = file.extension().or(file.file_name()).unwrap();
+                (
+                    kind.to_string_lossy().into_owned(),
+                    bytes.len() as u64 / RUNS,
+                )
+            })
+            .collect();
+        println!("{sizes:?} bytes a run");
+        sizes
     };
-    history.finish_campaign("k", &end).unwrap();
-    drop(history);
-    let after = statements(&History::open_to_read(&dir).unwrap());
-    assert!(before.is_subset(&after) && !dir.join("journal").exists());
-    assert!(
-        (1..20).contains(&(after.len() - before.len())),
-        "{}",
-        after.len() - before.len()
-    );
-    let [tables, logs] = [".sst", ".log"].map(|ending| size_of(&dir.join("store"), ending));
-    let count = after.len() as u64;
-    assert!(
-        count > 5_000 && tables < 150 * count && logs == 0 && journal < 40 * count,
-        "{count} {tables} {journal}"
-    );
+    let [whole, outcomes] = [true, false].map(size);
+    let sum = |sizes: &BTreeMap<String, u64>| sizes.values().sum::<u64>();
+    assert!(outcomes["runs"] < 400, "{outcomes:?}");
+    assert!(sum(&outcomes) < 4_000, "{outcomes:?}");
+    assert!(sum(&whole) < 10_000, "{whole:?}");
+    assert!(!outcomes.contains_key("motion") && outcomes["states"] == whole["states"]);
 }
 
-/// Otherwise a lost journal would not be noticed.
-#[test]
-fn a_history_is_marked_while_it_has_a_journal() {
-    let (_folder, left) = killed(2);
-    let version = || std::fs::read_to_string(left.join("VERSION")).unwrap();
-    assert_eq!(version(), "actcheck history 4 journal\n");
-    drop(History::open_to_read(&left).unwrap());
-    assert_eq!(version(), "actcheck history 4 journal\n");
-    drop(History::open(&left).unwrap());
-    assert_eq!(version(), "actcheck history 4\n");
-    drop(History::open(&left).unwrap());
-    assert_eq!(runs(&History::open_to_read(&left).unwrap()), ["k-1", "k-2"]);
-}
-
-/// The lines of an answer, in any order: those of unsorted rows, with numbers for blank nodes.
-fn answer(history: &History, query: &str) -> Vec<String> {
-    match history
-        .query(query)
-        .unwrap_or_else(|fault| panic!("{query}: {fault}"))
-    {
+/// The lines of an answer, in any order.
+fn lines(answer: QueryAnswer) -> Vec<String> {
+    match answer {
         QueryAnswer::Boolean(value) => vec![value.to_string()],
-        QueryAnswer::Table { rows, .. } => {
+        QueryAnswer::Table { columns, rows } => {
             let mut rows: Vec<String> = rows.iter().map(|row| format!("{row:?}")).collect();
             rows.sort();
+            rows.insert(0, columns.join(" "));
             rows
         }
         QueryAnswer::Graph(triples) => triples.iter().map(|triple| format!("{triple:?}")).collect(),
     }
+}
+
+fn answer(history: &History, query: &str) -> Vec<String> {
+    let answer = history.query(query);
+    lines(answer.unwrap_or_else(|fault| panic!("{query}: {fault}")))
 }
 
 /// Queries with every kind of pattern.
@@ -222,113 +613,134 @@ const QUERIES: [&str; 25] = [
     "DESCRIBE run:k-2",
 ];
 
-/// A reader takes from the journal the statements that a question needs, and each answer is that of
-/// the whole history.
+/// Each answer is that of a store that has the exported statements: for a reader beside the owner,
+/// for a reader that was not asked before, for the owner, and after the end of the campaign.
 #[test]
-fn answers_from_a_journal_are_those_after_the_end() {
-    compare_with_end(&killed(3).1);
-}
-
-#[test]
-fn answers_from_tables_and_a_journal_are_those_after_the_end() {
+fn answers_are_those_of_the_exported_statements() {
     let folder = tempfile::tempdir().unwrap();
-    let (live, left) = (folder.path().join("live"), folder.path().join("left"));
-    let with = |campaign, minute| {
-        let history = History::open(&live).unwrap();
+    let dir = folder.path().join("h");
+    // An earlier campaign, and one of which two processes have made runs.
+    let with = |campaign: &str, minute| {
+        let history = History::open(&dir).unwrap();
         history
             .begin_campaign(&sample_campaign(campaign, minute))
             .unwrap();
-        (0..3).for_each(|index| history.commit(&sample_run(campaign, index)).unwrap());
         history
     };
-    drop(with("a", 0));
-    let _owner = with("k", 1);
-    copy_open(&live, &left);
-    compare_with_end(&left);
+    let first = with("a", 0);
+    (0..3).for_each(|index| first.commit(&sample_run("a", index)).unwrap());
+    first.finish_campaign("a", &end()).unwrap();
+    drop(first);
+    let second = with("k", 1);
+    second.commit(&sample_run("k", 2)).unwrap();
+    drop(second);
+    let owner = History::open(&dir).unwrap();
+    owner.commit_outcomes(&sample_run("k", 1)).unwrap();
+    owner.commit(&sample_run("k", 0)).unwrap();
+    let compare = |reader: &History, place: &str| {
+        let exported = Exported::of(reader);
+        for query in QUERIES {
+            let expected = lines(exported.query(query));
+            assert_eq!(answer(reader, query), expected, "{place}: {query}");
+            let alone = History::open_to_read(&dir).unwrap();
+            assert_eq!(answer(&alone, query), expected, "{place}, alone: {query}");
+        }
+    };
+    compare(&History::open_to_read(&dir).unwrap(), "a reader");
+    compare(&owner, "the owner");
+    owner.finish_campaign("k", &end()).unwrap();
+    compare(&owner, "the owner after the end");
+    drop(owner);
+    compare(&History::open_to_read(&dir).unwrap(), "after the end");
 }
 
-fn compare_with_end(left: &Path) {
-    let folder = tempfile::tempdir().unwrap();
-    let whole = folder.path().join("whole");
-    copy(left, &whole);
-    drop(History::open(&whole).unwrap());
-    assert!(left.join("journal").exists() && !whole.join("journal").exists());
-    let open = || [left, &whole].map(|dir| History::open_to_read(dir).unwrap());
-    let [reader, after] = open();
-    for query in QUERIES {
-        let expected = answer(&after, query);
-        let alone = answer(&open()[0], query);
-        assert_eq!(
-            (&alone, &answer(&reader, query)),
-            (&expected, &expected),
-            "{query}"
-        );
+/// A killed campaign has the same lists for readers, for the next owner, and for a copy in other
+/// segments.
+#[test]
+fn every_list_is_the_same_for_readers_owners_and_copies() {
+    let (folder, left) = killed(3);
+    let [whole, copied] = ["whole", "copied"].map(|name| folder.path().join(name));
+    copy(&left, &whole);
+    let sources = [History::open_to_read(&left).unwrap()];
+    let into = History::open(&copied).unwrap();
+    let planned = plan(&sources, Some(&into), &MergeOptions::default()).unwrap();
+    carry_out(&planned, &sources, &into, &AtomicBool::new(false), || ()).unwrap();
+    drop(into);
+    let open = || {
+        [
+            History::open_to_read(&left).unwrap(),
+            History::open_to_read(&copied).unwrap(),
+            History::open_existing(&whole).unwrap(),
+        ]
+    };
+    fn same<T: PartialEq + std::fmt::Debug>(
+        histories: [History; 3],
+        of: impl Fn(&History) -> T,
+    ) -> T {
+        let [one, copied, owner] = histories;
+        let value = of(&one);
+        assert_eq!(of(&copied), value);
+        assert_eq!(of(&owner), value);
+        value
     }
     for run in ["k-1", "k-2", "k-3", "@last", "@last-failed"] {
-        let [one, other] = open().map(|history| history.newest_run(run).unwrap());
-        assert_eq!(one, other);
+        same(open(), |history| history.newest_run(run).unwrap());
     }
-    let [one, other] = open();
-    for run in ["k-3", "k-2", "k-1"] {
-        assert_eq!(one.newest_run(run).unwrap(), other.newest_run(run).unwrap());
-    }
-    assert_eq!(statements(&one), statements(&other));
-    let [one, other] = open().map(|history| {
+    same(open(), |history| {
+        ["k-3", "k-2", "k-1"].map(|run| history.newest_run(run).unwrap())
+    });
+    same(open(), statements);
+    same(open(), |history| {
         (
             history.campaigns().unwrap(),
             history.counted_runs().unwrap(),
         )
     });
-    assert_eq!(one, other);
-    let [one, other] = open().map(|history| {
+    let (_, rows) = same(open(), |history| {
         let rows = history.runs(&RunFilter::default()).unwrap();
         (history.scenes(&rows).unwrap(), rows)
     });
-    assert!(one.1.len() >= 3 && one == other);
-    // The campaign has all runs, half of them, or few: each is read in another way.
+    assert_eq!(rows.len(), 3);
+    let newest = same(open(), |history| {
+        history.newest_outcomes(&RunFilter::default()).unwrap()
+    });
+    assert!(newest.rows.len() > 5);
     for campaign in [None, Some("k"), Some("none")] {
-        let all = after.newest_outcomes(&RunFilter::default()).unwrap().rows;
-        let expected: Vec<_> = all
-            .iter()
-            .filter(|row| campaign.is_none_or(|id| row.campaign == id))
-            .collect();
+        let expected = if campaign == Some("none") {
+            0
+        } else {
+            newest.rows.len()
+        };
         for status in [RunStatus::Completed, RunStatus::Broken] {
-            let campaign = campaign.map(str::to_owned);
             let filter = RunFilter {
-                campaign,
+                campaign: campaign.map(str::to_owned),
                 status: Some(status),
                 ..RunFilter::default()
             };
-            let found = after.outcomes(&filter).unwrap();
-            let all_runs: Vec<_> = after
-                .runs(&filter)
-                .unwrap()
-                .into_iter()
-                .map(|run| run.run)
-                .collect();
-            assert!(found.iter().all(|row| all_runs.contains(&row.run)));
-            assert_eq!(
-                found.len(),
-                if status == RunStatus::Completed {
-                    expected.len()
-                } else {
-                    0
-                }
+            let (found, all) = same(open(), |history| {
+                (
+                    history.outcomes(&filter).unwrap(),
+                    history.runs(&filter).unwrap(),
+                )
+            });
+            assert!(
+                found
+                    .iter()
+                    .all(|row| all.iter().any(|run| run.run == row.run))
             );
+            let is_completed = status == RunStatus::Completed;
+            assert_eq!(found.len(), if is_completed { expected } else { 0 });
         }
     }
-    let [one, other] =
-        open().map(|history| history.newest_outcomes(&RunFilter::default()).unwrap());
-    assert!(one.rows.len() > 5 && one == other);
-    let [one, other] = open().map(|history| {
+    let vitals = same(open(), |history| {
         let mut vitals = Vec::new();
         history
             .each_vitals("k", |run| vitals.push(run.clone()))
             .unwrap();
         vitals
     });
-    assert!(one.len() == 3 && one == other);
-    let [one, other] =
-        open().map(|history| (history.campaign("k").unwrap(), history.run_ids().unwrap()));
-    assert_eq!(one, other);
+    assert_eq!(vitals.len(), 3);
+    same(open(), |history| {
+        (history.campaign("k").unwrap(), history.run_ids().unwrap())
+    });
 }
