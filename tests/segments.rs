@@ -99,12 +99,10 @@ fn the_program_and_the_tests_agree_on_the_form_of_frames() {
         let rows = std::fs::read(column(&left, "runs")).unwrap();
         if extension != "runs" {
             // Each run has the place of its frame.
-            let other = vec![b"other".as_slice(); 3];
-            let other = frames::file(&bytes, &other);
+            let other = frames::file(&bytes, &[b"other"; 3]);
             let repointed = frames::repointed(&rows, &bytes, &other);
-            let pairs = frames::contents(&rows);
-            let changed = pairs.iter().zip(frames::contents(&repointed));
-            assert!(changed.into_iter().all(|(own, new)| *own != new));
+            let (own, new) = (frames::contents(&rows), frames::contents(&repointed));
+            assert!(own.len() == 3 && own.iter().zip(new).all(|(own, new)| *own != new));
             assert!(frames::repointed(&repointed, &other, &bytes) == rows);
         }
     }
@@ -654,6 +652,15 @@ fn answers_are_those_of_the_exported_statements() {
     compare(&History::open_to_read(&dir).unwrap(), "after the end");
 }
 
+/// A value that several histories have.
+fn same<T: PartialEq + std::fmt::Debug>(histories: [History; 3], of: impl Fn(&History) -> T) -> T {
+    let [one, copied, owner] = histories;
+    let value = of(&one);
+    assert_eq!(of(&copied), value);
+    assert_eq!(of(&owner), value);
+    value
+}
+
 /// A killed campaign has the same lists for readers, for the next owner, and for a copy in other
 /// segments.
 #[test]
@@ -673,16 +680,6 @@ fn every_list_is_the_same_for_readers_owners_and_copies() {
             History::open_existing(&whole).unwrap(),
         ]
     };
-    fn same<T: PartialEq + std::fmt::Debug>(
-        histories: [History; 3],
-        of: impl Fn(&History) -> T,
-    ) -> T {
-        let [one, copied, owner] = histories;
-        let value = of(&one);
-        assert_eq!(of(&copied), value);
-        assert_eq!(of(&owner), value);
-        value
-    }
     for run in ["k-1", "k-2", "k-3", "@last", "@last-failed"] {
         same(open(), |history| history.newest_run(run).unwrap());
     }
