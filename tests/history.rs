@@ -961,7 +961,7 @@ fn damaged_or_missing_states_are_reported_and_other_data_is_readable() {
 }
 
 #[test]
-fn temporary_files_of_killed_processes_are_cleaned_up() {
+fn files_that_killed_processes_began_are_harmless() {
     let (folder, history) = filled();
     let dir = folder.path().join("history");
     for leftover in ["VERSION.1-7.tmp", "campaigns/z2/campaign.1-7.tmp"] {
