@@ -567,7 +567,7 @@ fn history_files() {
             show(&found);
         }
     });
-    // The entry point restores what it replaces.
+    // The entry point restores the files that it replaces.
     let history = History::open_to_read(&made).unwrap();
     assert_eq!(history.runs(&RunFilter::default()).unwrap().len(), 6);
     assert!(History::examine(&made).unwrap().0.damage.is_empty());

@@ -214,7 +214,7 @@ fn a_torn_tail_is_not_a_run() {
 
 /// While an owner writes, a torn tail is a run that it is writing.
 #[test]
-fn a_torn_tail_of_a_running_process_is_no_warning() {
+fn a_torn_tail_of_a_running_process_gives_no_warning() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path().join("h");
     let owner = History::open(&dir).unwrap();
@@ -333,7 +333,7 @@ fn an_empty_history_has_empty_lists() {
     assert_eq!(History::count_runs(&folder.path().join("none")), 0);
 }
 
-/// What is salvaged, and whether the run `k-3` is whole then.
+/// The salvaged runs, whether the run `k-3` is whole then, and the diagnostics.
 fn salvaged(folder: &Path, left: &Path) -> (Vec<String>, Option<bool>, String) {
     let _ = std::fs::remove_dir_all(folder.join("saved"));
     let name = left.display().to_string();
