@@ -646,10 +646,10 @@ fn a_run_whose_motion_is_damaged_is_saved_as_outcomes() {
     );
     assert_eq!(listed(folder.path(), "new"), right);
     let saved = History::open_to_read(&folder.path().join("new")).unwrap();
-    let is_whole = |run: &String| saved.is_whole(run).unwrap();
-    let whole = runs(&folder.path().join("new"))
+    let ids = runs(&folder.path().join("new"));
+    let whole = ids
         .iter()
-        .filter(|run| is_whole(run))
+        .filter(|run| saved.is_whole(run).unwrap())
         .count();
     assert_eq!(whole, 3);
     assert!(

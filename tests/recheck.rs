@@ -551,10 +551,17 @@ fn judgements_are_read_at_once_and_survive_a_kill() {
 fn half_a_batch_of_judgements_is_none() {
     let (folder, history, rules) = filled(6);
     let rules = rules.only(&["StaysUpright".to_owned()]).unwrap();
-    let (end, _) = judge(&history, &rules, 1, usize::MAX);
-    assert!(matches!(end.ending, Ending::Finished), "{end:?}");
+    let runs = history.runs(&RunFilter::default()).unwrap();
+    let (judged, _) = judge_stored(&history, &runs, &rules, 1, &AtomicBool::new(false)).unwrap();
+    for batch in judged.chunks(4) {
+        history
+            .commit_rechecks(batch, "2026-08-02T12:00:00Z")
+            .unwrap();
+    }
     assert_eq!(kept(&history), 6);
-    let dir = history.dir().to_owned();
+    // Its process is killed.
+    let dir = folder.path().join("killed");
+    copy(history.dir(), &dir);
     drop(history);
     let files = Files::Disk.list(&dir.join("campaigns/k"));
     let file = files
@@ -564,9 +571,12 @@ fn half_a_batch_of_judgements_is_none() {
     let whole = std::fs::read(&file).unwrap();
     let ends = frames::ends(&whole);
     assert_eq!((ends.len(), ends.last()), (2, Some(&whole.len())));
-    for length in [ends[1] - 1, ends[0] + 3, ends[0]] {
+    for length in [ends[1] - 1, ends[0] + 3] {
         std::fs::write(&file, &whole[..length]).unwrap();
-        assert_eq!(kept(&History::open_to_read(&dir).unwrap()), 4, "{length}");
+        let reader = History::open_to_read(&dir).unwrap();
+        assert_eq!(kept(&reader), 4, "{length}");
+        // They may have been reported.
+        assert!(reader.tail_warning().unwrap().is_some(), "{length}");
         let (found, _) = History::examine(&dir).unwrap();
         assert!(found.damage.is_empty(), "{length}: {found:?}");
         let left = folder.path().join(format!("left {length}"));

@@ -371,9 +371,10 @@ fn damage_to_a_column_is_reported_and_the_other_runs_are_saved() {
             let place = format!("campaigns/k/0001.{extension}");
             let file = column(&left, extension);
             let mut bytes = std::fs::read(&file).unwrap();
-            let at = match in_header {
-                true => frames::ends(&bytes)[1] + 5,
-                false => bytes.len() - 1,
+            let at = if in_header {
+                frames::ends(&bytes)[1] + 5
+            } else {
+                bytes.len() - 1
             };
             bytes[at] ^= 4;
             std::fs::write(&file, bytes).unwrap();
