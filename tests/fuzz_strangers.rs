@@ -434,11 +434,15 @@ fn damage(history: &Path, random: &mut Mutations) {
         }
         let number = random.below(contents.len());
         let content = &mut contents[number];
-        match random.below(4) {
-            // Compressed contents do not have the texts.
-            0 | 1 => replace(content, random),
-            2 => *content = random.text(content, &["\u{0}", "\u{7f}"], &[]),
+        match random.below(5) {
+            0..=2 => replace(content, random),
+            3 => *content = random.text(content, &["\u{0}", "\u{7f}"], &[]),
             _ => *content = random.pick(&frames::contents(&bytes)).to_vec(),
+        }
+        if file.ends_with("campaign") {
+            // Its two copies are equal.
+            let content = content.clone();
+            contents.fill(content);
         }
         let written = if random.below(3) == 0 {
             random.text(&bytes, &["\u{0}", "\u{7f}"], &[])
@@ -460,19 +464,44 @@ fn damage(history: &Path, random: &mut Mutations) {
     }
 }
 
-/// Replaces a text of a content where it occurs first.
-fn replace(content: &mut [u8], random: &mut Mutations) {
+/// First bytes of a compressed part.
+const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
+
+/// Replaces texts of a content, also in its compressed part, unless that needs a dictionary.
+fn replace(content: &mut Vec<u8>, random: &mut Mutations) {
+    let at = content.windows(ZSTD.len()).position(|part| part == ZSTD);
+    let expanded = at.and_then(|at| {
+        let expanded = zstd::bulk::decompress(&content[at..], 4 << 20).ok()?;
+        Some((at, expanded))
+    });
+    let Some((at, mut expanded)) = expanded else {
+        replace_texts(content, random);
+        return;
+    };
+    // The size before the compressed part remains right.
+    replace_texts(&mut expanded, random);
+    content.truncate(at);
+    content.extend(zstd::bulk::compress(&expanded, 1).unwrap());
+}
+
+/// Replaces a text everywhere, or changes a byte.
+fn replace_texts(content: &mut [u8], random: &mut Mutations) {
+    if content.is_empty() {
+        return;
+    }
     let (from, others) = random.pick(&REPLACED);
     let other = random.pick(others).bytes().chain(std::iter::repeat(b' '));
-    let at = content
-        .windows(from.len())
-        .position(|part| part == from.as_bytes());
-    if let Some(at) = at {
-        let replaced = &mut content[at..at + from.len()];
-        replaced
-            .iter_mut()
-            .zip(other)
-            .for_each(|(byte, other)| *byte = other);
+    let other: Vec<u8> = other.take(from.len()).collect();
+    let mut is_found = false;
+    for at in 0..content.len().saturating_sub(from.len() - 1) {
+        if content[at..].starts_with(from.as_bytes()) {
+            content[at..at + from.len()].copy_from_slice(&other);
+            is_found = true;
+        }
+    }
+    if !is_found || random.below(4) == 0 {
+        let at = random.below(content.len());
+        content[at] ^= 1 << random.below(8);
     }
 }
 

@@ -282,20 +282,7 @@ fn no_command_follows_a_link_of_a_history() {
         assert!(stranger.history().join(name).exists(), "{name}");
         stranger.link(&format!("configs/.actcheck/{name}"), "precious");
         let said = stranger.unchanged(&COMMANDS, name);
-        // Lists read the first ones; the examination reads all.
-        let is_column = ["details", "states", "motion", "judgements"]
-            .iter()
-            .any(|column| name.ends_with(column));
-        if is_column {
-            let file = name.rsplit('/').next().unwrap();
-            assert!(
-                !said[8].starts_with("Some(0)") && said[8].contains(file),
-                "{name}: {}",
-                said[8]
-            );
-        } else {
-            assert!(said[0].contains("H027"), "{name}: {}", said[0]);
-        }
+        assert!(said[0].contains("H027"), "{name}: {}", said[0]);
     }
     // A folder of its own, with nothing but a version and links, as in a small pull request.
     let stranger = Stranger::new();
@@ -452,7 +439,6 @@ fn only_files_of_the_program_are_deleted() {
     let campaign = campaign_of(&stranger.history());
     let mine = [
         "notes.txt".to_owned(),
-        "campaigns/notes.tmp".to_owned(),
         format!("{campaign}/notes.txt"),
         format!("{campaign}/notes.tmp"),
         format!("{campaign}/notes.runs"),
@@ -551,6 +537,10 @@ fn pipes_and_devices_in_a_history_are_refused() {
         "VERSION".to_owned(),
         format!("{campaign}/campaign"),
         format!("{campaign}/0001.runs"),
+        format!("{campaign}/0001.details"),
+        format!("{campaign}/0001.states"),
+        format!("{campaign}/0001.motion"),
+        relative(&named(made.path(), ".judgements"), made.path()),
     ];
     let special_file = |name: &str, special: &str| {
         let stranger = Stranger::new();
@@ -573,22 +563,6 @@ fn pipes_and_devices_in_a_history_are_refused() {
                     stderr(&output).contains("H027"),
                     "{name} {special} {arguments:?}: {}",
                     stderr(&output)
-                );
-            }
-        }
-    }
-    // Columns that few commands read.
-    for extension in ["details", "states", "motion", "judgements"] {
-        let name = relative(&named(made.path(), extension), made.path());
-        for special in ["pipe", "/dev/zero"] {
-            let stranger = special_file(&name, special);
-            for arguments in COMMANDS {
-                let output = ended(&stranger.project(), arguments, extension);
-                let said = stdout(&output) + &stderr(&output);
-                assert!(
-                    arguments != COMMANDS[8]
-                        || output.status.code() != Some(0) && said.contains(extension),
-                    "{extension} {special}: {said}"
                 );
             }
         }
@@ -680,6 +654,16 @@ fn kept_as_outcomes(history: &Path) {
     (0..6).for_each(|index| history.commit_outcomes(&sample_run("k", index)).unwrap());
 }
 
+/// A bomb in place of the values of a run, whose frames begin with the index of the run, and with
+/// the distance to the frame that is their dictionary: 0 for none.
+fn about_run(extension: &str, content: &[u8], bomb: &[u8]) -> Vec<u8> {
+    if !["details", "states", "motion"].contains(&extension) {
+        return bomb.to_vec();
+    }
+    let index = content.iter().position(|byte| byte & 0x80 == 0).unwrap();
+    [&content[..=index], &[0], bomb].concat()
+}
+
 /// 262 kB of a history expanded to 8 GB.
 #[test]
 fn a_history_that_expands_a_thousand_times_is_refused() {
@@ -727,7 +711,12 @@ fn a_history_that_expands_a_thousand_times_is_refused() {
             copy(made.path(), &stranger.history());
             let mut contents = frames::contents(&bytes);
             let count = contents.len();
-            contents[count - 1] = bomb;
+            let bomb = about_run(extension, contents[count - 1], bomb);
+            contents[count - 1] = &bomb;
+            if extension == "campaign" {
+                // It has two equal copies.
+                contents = vec![bomb.as_slice(); 2];
+            }
             let written = frames::file(&bytes, &contents);
             let at = |file: &Path| stranger.history().join(relative(file, made.path()));
             std::fs::write(at(&file), &written).unwrap();
@@ -769,7 +758,8 @@ fn a_history_that_expands_a_thousand_times_is_refused() {
         let file = named(&stranger.history(), extension);
         let bytes = std::fs::read(&file).unwrap();
         let mut contents = frames::contents(&bytes);
-        contents[0] = &bombs[0];
+        let bomb = about_run(extension, contents[0], &bombs[0]);
+        contents[0] = &bomb;
         let written = frames::file(&bytes, &contents);
         let runs_file = named(&stranger.history(), "runs");
         let runs = std::fs::read(&runs_file).unwrap();

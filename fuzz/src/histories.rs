@@ -24,8 +24,8 @@ pub const PLACES: [&str; 9] = [
 ];
 /// The file whose frames have the places of those in other columns.
 const RUNS: &str = "campaigns/k/0001.runs";
-/// The ways in which a file is written: with right checksums, as it is, and with runs that have the
-/// places of its frames.
+/// The ways in which a file is written: with right checksums, as it is, and so that other frames fit:
+/// runs have the places of its frames, and the copies of a campaign are equal.
 pub const WAYS: usize = 3;
 
 /// A history with runs of the campaign `k`, in a folder that must not exist: every second one is
@@ -115,10 +115,15 @@ pub fn history(folder: &Path, data: &[u8]) -> Result<(), Diagnostics> {
         usize::from(*first) / PLACES.len() % WAYS,
     );
     let is_column = place.starts_with("campaigns");
-    let bytes = match way {
-        1 => content.to_vec(),
-        _ if is_column => frames::file(content, &frames::contents(content)),
-        _ => content.to_vec(),
+    let mut contents = frames::contents(content);
+    if way == 2 && place == PLACES[0] {
+        // The two copies of a campaign are equal.
+        contents = vec![contents.first().copied().unwrap_or_default(); 2];
+    }
+    let bytes = if is_column && way != 1 {
+        frames::file(content, &contents)
+    } else {
+        content.to_vec()
     };
     let file = path(folder, place, &bytes);
     let before = std::fs::read(&file).ok();
