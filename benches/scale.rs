@@ -2,7 +2,7 @@
 //!
 //! `cargo bench --bench scale -- [RUNS]…` (default: 1000 10000 100000): real runs of a small
 //! configuration, multiplied by a generator that changes scenes, margins and outcomes, and kept as
-//! outlines. Each command runs in a process of its own. Required for a million runs: at most 10 kB
+//! outcomes. Each command runs in a process of its own. Required for a million runs: at most 10 kB
 //! a run, and 10 s and 2 GB for each command that reads.
 
 use std::path::{Path, PathBuf};
@@ -24,8 +24,8 @@ const MOST_BYTES: f64 = 10_000.0;
 /// Size of a shard, unless there would be too many.
 const RUNS_IN_A_SHARD: u64 = 1_000;
 const MOST_SHARDS: u64 = 1_000;
-/// Size of a file of outlines, as a shard writes it.
-const RUNS_IN_A_FILE: usize = 128;
+/// Number of runs that are stored together.
+const RUNS_IN_A_BATCH: usize = 128;
 /// Number of shards that are made at the same time.
 const THREADS: usize = 2;
 
@@ -146,7 +146,7 @@ fn simulated(env: &Env, index: u64) -> Option<RunRecord> {
         },
     )
     .ok()?;
-    // Outlines have no motion.
+    // Outcomes are kept without motion.
     run.trace.frames.rows.clear();
     for course in &mut run.trace.robot_courses {
         (course.motion, course.samples) = Default::default();
@@ -192,12 +192,12 @@ fn make_shard(env: &Env, made: &[RunRecord], size: u64, shard: Shard, folder: &P
         (record.planned_runs, record.seed, record.shards) = (size / 2, seed, vec![shard]);
         history.begin_campaign(&record).expect("the disk has room");
         let indices: Vec<u64> = (0..size / 2).filter(|index| shard.has(*index)).collect();
-        for indices in indices.chunks(RUNS_IN_A_FILE) {
+        for indices in indices.chunks(RUNS_IN_A_BATCH) {
             let changed =
                 |index: &u64| changed(&made[*index as usize % made.len()], campaign, *index, rate);
             let runs: Vec<RunRecord> = indices.iter().map(changed).collect();
             history
-                .commit_outlines(campaign, &runs)
+                .commit_all_outcomes(campaign, &runs)
                 .expect("the disk has room");
         }
         let end = CampaignEnd {

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""How many requests per second does `actcheck serve` answer, compared with oxigraph's server on the same store?
+"""How many requests per second does `actcheck serve` answer, compared with oxigraph's server on the same statements?
 
     python3 benches/serve.py HISTORY --actcheck target/release/actcheck --oxigraph ~/.cargo/bin/oxigraph
 
-Both servers run at the same time on copies of the history; the load generator `wrk` (Debian: `apt-get install wrk`) asks one
+Both servers run at the same time, on a copy of the history and on its export; the load generator `wrk` (Debian: `apt-get install wrk`) asks one
 after the other, several times, on 127.0.0.1. Printed for 1, 16 and 64 connections: the median of the ratios of the rates (actcheck
 over oxigraph), the median rates, 50th and 99th percentiles, the processor time for each request, and the number of refused
 requests. Afterwards come the servers' memory before and after the load, and the times of queries that are not light, with and
@@ -79,7 +79,9 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         ours, theirs = Path(folder, "ours"), Path(folder, "theirs")
         shutil.copytree(given.history, ours)
-        shutil.copytree(given.history / "store", theirs)
+        exported = str(Path(folder, "all.nq"))
+        subprocess.run([given.actcheck, "export", "rdf", exported, "--history", str(ours)], check=True)
+        subprocess.run([given.oxigraph, "load", "--location", str(theirs), "--file", exported], check=True)
         servers = {
             "actcheck": (7978, [given.actcheck, "serve", "--port", "7978", "--history", str(ours)], "sparql"),
             "oxigraph": (7979, [given.oxigraph, "serve-read-only", "--location", str(theirs), "--bind", "127.0.0.1:7979"], "query"),

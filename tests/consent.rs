@@ -21,7 +21,7 @@ const SKILL: &str = "import os, wire\n\
     wire.serve(lambda link, begin: {'type': 'end', 'succeeded': True, 'message': 'did nothing'})\n";
 
 /// A downloaded project: `their project/c.toml` names a program, and the history beside it keeps
-/// outlines.
+/// outcomes.
 struct Downloaded {
     folder: tempfile::TempDir,
     run: String,

@@ -1,20 +1,22 @@
 //! Damage to any file of a history is found or harmless, and readable data is saved.
 //!
 //! `ACTCHECK_FLIPS` sets the number of flipped bits; `ACTCHECK_DAMAGED` the number of flips and of
-//! truncations of each kind of file, of which `ACTCHECK_KIND` chooses one, such as `traces/trace`,
-//! and `ACTCHECK_SEED` the places.
+//! truncations of each kind of file, of which `ACTCHECK_KIND` chooses one, such as `details`, and
+//! `ACTCHECK_SEED` the places.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use actcheck::history::{CampaignEnd, History, RunFilter};
+use actcheck::base::{Outcome, names};
+use actcheck::history::{CampaignEnd, History, NewestJudgements, Recheck, RunFilter};
 
+use crate::fuzz_corpus::entrances::frames;
 use crate::history::{sample_campaign, sample_run};
 use crate::support::planted::Dice;
-use crate::support::{actcheck, copy, copy_made_history, copy_open, stderr, stdout};
+use crate::support::{actcheck, copy, copy_made_history, stderr, stdout};
 
 /// Time limit of one command: it takes about a second, or is in an endless loop. Unit: seconds.
 const MOST_SECS: u64 = 60;
@@ -138,34 +140,70 @@ fn an_intact_history_passes_its_examination() {
         stdout(&output),
         stderr(&output)
     );
-    assert_eq!(
-        stdout(&output),
-        "h: store, 4 traces and mirror are intact\n"
-    );
+    assert_eq!(stdout(&output), "h: 4 runs and mirror are intact\n");
 }
 
-/// A history with every kind of file: runs that are kept whole, outlines, tables, and the journal
-/// of a killed process.
+/// A history with every kind of file: runs that are kept whole and as outcomes, in campaigns that
+/// have ended and in one of a killed process, later judgements, and tables.
 fn every_kind(folder: &Path) {
-    let (live, left) = (folder.join("live"), folder.join("h"));
-    copy_made_history(&live);
-    let history = History::open(&live).unwrap();
+    let dir = folder.join("h");
+    copy_made_history(&dir);
+    let history = History::open(&dir).unwrap();
     history.begin_campaign(&sample_campaign("o", 1)).unwrap();
-    (0..3).for_each(|index| history.commit_outline(&sample_run("o", index)).unwrap());
+    (0..3).for_each(|index| history.commit_outcomes(&sample_run("o", index)).unwrap());
     let end = CampaignEnd {
         ended: "2026-08-01T13:00:00Z".to_owned(),
         ..CampaignEnd::default()
     };
     history.finish_campaign("o", &end).unwrap();
     drop(history);
-    let history = History::open(&live).unwrap();
+    let history = History::open(&dir).unwrap();
     history.begin_campaign(&sample_campaign("k", 2)).unwrap();
     (0..3).for_each(|index| history.commit(&sample_run("k", index)).unwrap());
-    copy_open(&live, &left);
     drop(history);
-    std::fs::remove_dir_all(&live).unwrap();
+    let history = History::open(&dir).unwrap();
+    judge_again(&history, &["o-1", "o-2", "k-1"]);
+    drop(history);
     let made = asked(folder, &["analyse", "--history", "h"]).unwrap();
     assert_eq!(made.0, Some(0), "{}", made.2);
+    let kinds: BTreeSet<String> = files(&dir).iter().map(|file| kind_of(file)).collect();
+    for kind in [
+        "campaign",
+        "runs",
+        "details",
+        "states",
+        "motion",
+        "judgements",
+        "VERSION",
+        "parquet",
+    ] {
+        assert!(kinds.contains(kind), "no {kind} in {kinds:?}");
+    }
+}
+
+/// Stores a failed outcome of a property of runs, which a later judgement found.
+fn judge_again(history: &History, runs: &[&str]) {
+    let property = names::act("MovedObject");
+    let recheck = |run: &&str| {
+        let before = NewestJudgements::of(history)
+            .read(run, 1, std::slice::from_ref(&property))
+            .unwrap()
+            .remove(0);
+        let mut now = before.judgement.clone();
+        (now.outcome, now.margin) = (Outcome::Failed, Some(-0.25));
+        Recheck {
+            run: (*run).to_owned(),
+            step: 1,
+            action: names::act("Pick"),
+            before: Some(before),
+            now,
+        }
+    };
+    let rechecks: Vec<Recheck> = runs.iter().map(recheck).collect();
+    history
+        .commit_rechecks(&rechecks, "2026-08-09T00:00:00Z")
+        .unwrap();
+    history.finish_rechecks().unwrap();
 }
 
 /// Questions that are asked after the damage. The tables are deleted before the second analysis,
@@ -179,8 +217,7 @@ const ASKED: [&[&str]; 6] = [
     &["show", "o-2", "--format", "json", "--history", "h"],
 ];
 
-/// The answers; that of an export is its table. `show` is also asked for a run with a trace of a
-/// simulation.
+/// The answers; that of an export is its table. `show` is also asked for a run of a simulation.
 fn asked_anew(folder: &Path, first: &str, damage: &str) -> Vec<(Option<i32>, String, String)> {
     let _ = std::fs::remove_dir_all(folder.join("out"));
     let show = ["show", first, "--format", "json", "--history", "h"];
@@ -204,24 +241,13 @@ fn asked_anew(folder: &Path, first: &str, damage: &str) -> Vec<(Option<i32>, Str
         .collect()
 }
 
-/// The kind of a file of a history: its folder, and its ending or the first word of its name.
+/// The kind of a file of a history: its extension, or its name without one.
 fn kind_of(file: &Path) -> String {
-    let name = file.file_name().unwrap().to_string_lossy().into_owned();
-    let kind = file.extension().map_or_else(
-        || name.clone(),
-        |ending| ending.to_string_lossy().into_owned(),
-    );
-    let place = file
-        .parent()
-        .unwrap()
-        .file_name()
-        .unwrap()
-        .to_string_lossy()
-        .into_owned();
-    format!("{place}/{}", kind.split('-').next().unwrap())
+    let kind = file.extension().or(file.file_name());
+    kind.unwrap().to_string_lossy().into_owned()
 }
 
-/// One flipped bit in a trace, and tables made anew from it, gave other numbers with exit code 0.
+/// One flipped bit in the states of a run, and tables made anew from them, gave other numbers with exit code 0.
 #[test]
 fn numbers_made_anew_from_damaged_files_are_the_same_or_refused() {
     let number = |name: &str, default| {
@@ -236,9 +262,10 @@ fn numbers_made_anew_from_damaged_files_are_the_same_or_refused() {
     );
     let whole = tempfile::tempdir().unwrap();
     every_kind(whole.path());
-    let runs = files(&whole.path().join("h/traces")).into_iter();
-    let mut runs = runs.map(|file| file.file_stem().unwrap().to_string_lossy().into_owned());
-    let first = runs.find(|run| !run.starts_with("k-")).unwrap();
+    let first = runs(&whole.path().join("h"))
+        .into_iter()
+        .find(|run| !run.starts_with("k-") && !run.starts_with("o-"))
+        .unwrap();
     let keep = tempfile::tempdir().unwrap();
     copy(&whole.path().join("h"), &keep.path().join("h"));
     let right = asked_anew(whole.path(), &first, "no damage");
@@ -246,7 +273,7 @@ fn numbers_made_anew_from_damaged_files_are_the_same_or_refused() {
     let relative = |file: PathBuf| file.strip_prefix(keep.path()).unwrap().to_path_buf();
     let all: Vec<PathBuf> = files(&keep.path().join("h"))
         .into_iter()
-        .filter(|file| file.metadata().unwrap().len() > 0 && file.file_name().unwrap() != "LOG")
+        .filter(|file| file.metadata().unwrap().len() > 0)
         .map(relative)
         .collect();
     let mut kinds: Vec<String> = all.iter().map(|file| kind_of(file)).collect();
@@ -339,7 +366,7 @@ fn a_flipped_bit_in_any_file_is_found_or_harmless() {
         let folder = copied();
         let all: Vec<PathBuf> = files(&folder.path().join("h"))
             .into_iter()
-            .filter(|file| file.metadata().unwrap().len() > 0 && file.file_name().unwrap() != "LOG")
+            .filter(|file| file.metadata().unwrap().len() > 0)
             .collect();
         // Each kind of file comes up as often as the others.
         let mut kinds: Vec<String> = all.iter().map(|file| kind_of(file)).collect();
@@ -373,7 +400,7 @@ fn a_flipped_bit_in_any_file_is_found_or_harmless() {
                 same || code == 2,
                 "{place}: another answer with exit code 0"
             );
-            // The trace of a run is read by few commands; the examination reads all.
+            // The states of a run are read by few commands; the examination reads all.
             is_same &= same;
         }
         assert!(is_same || found, "{place}: {told}");
@@ -389,28 +416,76 @@ fn a_flipped_bit_in_any_file_is_found_or_harmless() {
     }
 }
 
-/// A trace file has a copy of its run's outcomes. Restored from a backup under a wrong name, it
-/// showed those of another run.
+/// The ids of all runs.
+fn runs(history: &Path) -> Vec<String> {
+    let history = History::open_to_read(history).unwrap();
+    let rows = history.runs(&RunFilter::default()).unwrap();
+    rows.into_iter().map(|row| row.run).collect()
+}
+
+/// The files of the only campaign of the made history with an extension.
+fn column(history: &Path, extension: &str) -> PathBuf {
+    files(&history.join("campaigns"))
+        .into_iter()
+        .find(|file| file.extension().is_some_and(|own| own == extension))
+        .unwrap()
+}
+
+/// A file that was restored from a backup under a wrong name showed the outcomes of another run.
 #[test]
-fn a_trace_file_of_another_run_does_not_change_outcomes() {
-    let folder = copied();
-    let show = |run: &str| {
-        stdout(&actcheck(
-            folder.path(),
-            &["show", run, "--history", "h", "--format", "json"],
-        ))
+fn a_file_of_another_campaign_does_not_change_outcomes() {
+    let whole = tempfile::tempdir().unwrap();
+    let history = History::open(&whole.path().join("h")).unwrap();
+    for (campaign, minute, first) in [("a", 1, 0), ("b", 2, 1)] {
+        history
+            .begin_campaign(&sample_campaign(campaign, minute))
+            .unwrap();
+        // Each has three runs of equal size; the failed ones are others.
+        (0..3).for_each(|index| {
+            let mut run = sample_run(campaign, index + first);
+            (run.id, run.index) = (format!("{campaign}-{}", index + 1), index);
+            history.commit(&run).unwrap();
+        });
+        history
+            .finish_campaign(
+                campaign,
+                &CampaignEnd {
+                    ended: "2026-08-01T13:00:00Z".to_owned(),
+                    ..CampaignEnd::default()
+                },
+            )
+            .unwrap();
+    }
+    drop(history);
+    let show = |folder: &Path, run: &str| {
+        asked(folder, &["show", run, "--history", "h", "--format", "json"]).unwrap()
     };
-    let traces: Vec<PathBuf> = files(&folder.path().join("h/traces"));
-    let names: Vec<String> = traces
-        .iter()
-        .map(|file| file.file_stem().unwrap().to_string_lossy().into_owned())
-        .collect();
-    let before: Vec<String> = names.iter().map(|run| show(run)).collect();
-    let other = (1..traces.len())
-        .find(|at| std::fs::read(&traces[*at]).unwrap() != std::fs::read(&traces[0]).unwrap());
-    std::fs::copy(&traces[other.expect("two runs differ")], &traces[0]).unwrap();
-    let after: Vec<String> = names.iter().map(|run| show(run)).collect();
-    assert_eq!(after, before);
+    let ids = ["a-1", "a-2", "a-3"];
+    let right = ids.map(|run| show(whole.path(), run).1);
+    for extension in ["details", "states", "motion"] {
+        let folder = tempfile::tempdir().unwrap();
+        copy(&whole.path().join("h"), &folder.path().join("h"));
+        let [own, other] = ["a", "b"].map(|campaign| {
+            folder
+                .path()
+                .join(format!("h/campaigns/{campaign}/0001.{extension}"))
+        });
+        assert_ne!(std::fs::read(&own).unwrap(), std::fs::read(&other).unwrap());
+        std::fs::copy(&other, &own).unwrap();
+        for (run, right) in ids.iter().zip(&right) {
+            let (code, shown, said) = show(folder.path(), run);
+            assert!(
+                shown == *right || code == Some(2) && said.contains("H007"),
+                "{extension} {run}: {code:?} {shown}{said}"
+            );
+        }
+        let (code, said, _) =
+            asked(folder.path(), &["health", "--integrity", "--history", "h"]).unwrap();
+        assert!(
+            code == Some(1) && said.contains(&format!("campaigns/a/0001.{extension}")),
+            "{extension}: {said}"
+        );
+    }
 }
 
 #[test]
@@ -434,7 +509,7 @@ fn a_damaged_mirror_is_written_anew_and_the_numbers_are_the_same() {
             let output = actcheck(folder.path(), &["health", "--integrity", "--history", "h"]);
             assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
             assert!(
-                stdout(&output).contains("it differs from the store"),
+                stdout(&output).contains("it differs from the runs"),
                 "{}",
                 stdout(&output)
             );
@@ -458,65 +533,110 @@ fn listed(folder: &Path, history: &str) -> Vec<String> {
     text.lines().map(str::to_owned).collect()
 }
 
-/// A store whose manifest is damaged can't be opened at all: its sealed copy replaces it.
+/// Rows are made again from details.
 #[test]
-fn a_store_without_a_readable_manifest_is_saved_completely() {
+fn a_history_without_a_readable_list_of_runs_is_saved_completely() {
     let folder = copied();
     let right = listed(folder.path(), "h");
-    let is_manifest = |file: &PathBuf| {
-        file.file_name()
-            .unwrap()
-            .to_string_lossy()
-            .starts_with("MANIFEST")
-    };
-    let manifest = files(&folder.path().join("h/store"))
-        .into_iter()
-        .find(is_manifest)
-        .unwrap();
-    std::fs::write(&manifest, b"nothing").unwrap();
+    let file = column(&folder.path().join("h"), "runs");
+    let mut bytes = std::fs::read(&file).unwrap();
+    // In the header of the first frame, so that no frame can be found by the one before it.
+    bytes[frames::HEAD] ^= 1;
+    std::fs::write(&file, &bytes).unwrap();
     let output = actcheck(folder.path(), &["list", "--history", "h"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(
-        stderr(&output).contains("H007") && stderr(&output).contains("MANIFEST"),
+        stderr(&output).contains("H007") && stderr(&output).contains("0001.runs"),
         "{}",
         stderr(&output)
     );
-    // A process that writes must not touch it: the library would remove the tables that the
-    // manifest does not list.
-    assert!(History::open_existing(&folder.path().join("h")).is_err());
+    // A process that writes must not touch it: runs would get the numbers of others.
+    let opened = History::open_existing(&folder.path().join("h"))
+        .and_then(|history| history.runs(&RunFilter::default()).map(drop));
+    assert!(opened.is_err());
+    assert_eq!(std::fs::read(&file).unwrap(), bytes);
     let output = actcheck(folder.path(), &["merge", "--salvage", "h", "--into", "new"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert_eq!(listed(folder.path(), "new"), right);
 }
 
 #[test]
-fn the_runs_that_a_damaged_table_loses_are_named_and_made_again() {
+fn the_runs_that_a_damaged_column_loses_are_named_and_made_again() {
+    for extension in ["details", "states"] {
+        let folder = copied();
+        let right = listed(folder.path(), "h");
+        let file = column(&folder.path().join("h"), extension);
+        let mut bytes = std::fs::read(&file).unwrap();
+        // In the last frame: the first one is needed to read the others.
+        let at = bytes.len() - 10;
+        bytes[at] ^= 0x10;
+        std::fs::write(&file, bytes).unwrap();
+        let output = actcheck(folder.path(), &["health", "--integrity", "--history", "h"]);
+        assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+        assert!(
+            stdout(&output).contains(&*file.file_name().unwrap().to_string_lossy()),
+            "{}",
+            stdout(&output)
+        );
+        assert!(
+            stderr(&output).contains("merge --salvage"),
+            "{}",
+            stderr(&output)
+        );
+        let output = actcheck(folder.path(), &["merge", "--salvage", "h", "--into", "new"]);
+        assert!(
+            output.status.code().is_some_and(|code| code < 2),
+            "{}",
+            stderr(&output)
+        );
+        let saved = runs(&folder.path().join("new"));
+        assert_eq!(saved.len(), 3, "{extension}: {}", stderr(&output));
+        let lost = runs(&folder.path().join("h"));
+        let lost = lost.iter().find(|run| !saved.contains(run)).unwrap();
+        assert!(
+            stderr(&output).contains(lost),
+            "{lost}: {}",
+            stderr(&output)
+        );
+        let config = crate::support::root()
+            .join("configs/quick.toml")
+            .display()
+            .to_string();
+        let resumed = actcheck(
+            folder.path(),
+            &[
+                "run",
+                &config,
+                "--resume",
+                "--history",
+                "new",
+                "--jobs",
+                "1",
+            ],
+        );
+        let resumed = stderr(&resumed);
+        assert_eq!(runs(&folder.path().join("new")).len(), 4, "{resumed}");
+        assert_eq!(listed(folder.path(), "new"), right, "{extension}");
+    }
+}
+
+/// A run without its motion has all outcomes; the motion comes back when it is simulated again.
+#[test]
+fn a_run_whose_motion_is_damaged_is_saved_as_outcomes() {
     let folder = copied();
     let right = listed(folder.path(), "h");
-    let is_table = |file: &PathBuf| file.extension().is_some_and(|ending| ending == "sst");
-    let tables: Vec<PathBuf> = files(&folder.path().join("h/store"))
-        .into_iter()
-        .filter(is_table)
-        .collect();
-    let largest = tables
-        .iter()
-        .max_by_key(|file| file.metadata().unwrap().len())
-        .unwrap();
-    let mut bytes = std::fs::read(largest).unwrap();
-    let middle = bytes.len() / 2;
-    bytes[middle] ^= 0x10;
-    std::fs::write(largest, bytes).unwrap();
+    let file = column(&folder.path().join("h"), "motion");
+    let mut bytes = std::fs::read(&file).unwrap();
+    let at = bytes.len() - 10;
+    bytes[at] ^= 0x10;
+    std::fs::write(&file, bytes).unwrap();
+    assert_eq!(listed(folder.path(), "h"), right);
     let output = actcheck(folder.path(), &["health", "--integrity", "--history", "h"]);
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     assert!(
-        stdout(&output).contains(&*largest.file_name().unwrap().to_string_lossy()),
+        stdout(&output).contains("0001.motion"),
         "{}",
         stdout(&output)
-    );
-    assert!(
-        stderr(&output).contains("merge --salvage"),
-        "{}",
-        stderr(&output)
     );
     let output = actcheck(folder.path(), &["merge", "--salvage", "h", "--into", "new"]);
     assert!(
@@ -524,29 +644,63 @@ fn the_runs_that_a_damaged_table_loses_are_named_and_made_again() {
         "{}",
         stderr(&output)
     );
-    let config = crate::support::root()
-        .join("configs/quick.toml")
-        .display()
-        .to_string();
-    let resumed = actcheck(
-        folder.path(),
-        &[
-            "run",
-            &config,
-            "--resume",
-            "--history",
-            "new",
-            "--jobs",
-            "1",
-        ],
-    );
-    let resumed = stderr(&resumed);
-    let all = History::open_to_read(&folder.path().join("new"))
-        .unwrap()
-        .runs(&RunFilter::default())
-        .unwrap();
-    assert_eq!(all.len(), 4, "{resumed}");
     assert_eq!(listed(folder.path(), "new"), right);
+    let saved = History::open_to_read(&folder.path().join("new")).unwrap();
+    let ids = runs(&folder.path().join("new"));
+    let whole = ids
+        .iter()
+        .filter(|run| saved.is_whole(run).unwrap())
+        .count();
+    assert_eq!(whole, 3);
+    assert!(
+        History::examine(&folder.path().join("new"))
+            .unwrap()
+            .0
+            .damage
+            .is_empty()
+    );
+}
+
+/// A campaign's end says how many runs each segment has: without it, a file that lost its last
+/// frames would look like one with fewer runs.
+#[test]
+fn runs_that_are_missing_after_the_end_of_a_campaign_are_reported() {
+    let keep = copied();
+    let file = column(&keep.path().join("h"), "runs");
+    let bytes = std::fs::read(&file).unwrap();
+    let ends = frames::ends(&bytes);
+    assert_eq!(ends.last(), Some(&bytes.len()));
+    // Fewer frames, within a frame, no frame, an empty file, and none.
+    let lengths = [ends[2], ends[0], ends[3] - 1, frames::HEAD, 3, 0];
+    for length in lengths.into_iter().map(Some).chain([None]) {
+        match length {
+            Some(length) => std::fs::write(&file, &bytes[..length]).unwrap(),
+            None => std::fs::remove_file(&file).unwrap(),
+        }
+        let output = actcheck(keep.path(), &["list", "--history", "h"]);
+        assert_eq!(
+            output.status.code(),
+            Some(2),
+            "{length:?}: {}",
+            stdout(&output)
+        );
+        assert!(stderr(&output).contains("H007"), "{}", stderr(&output));
+        let output = actcheck(keep.path(), &["health", "--integrity", "--history", "h"]);
+        assert!(
+            output.status.code() == Some(1) && stdout(&output).contains("0001.runs"),
+            "{length:?}: {}{}",
+            stdout(&output),
+            stderr(&output)
+        );
+    }
+    let output = actcheck(keep.path(), &["merge", "--salvage", "h", "--into", "new"]);
+    assert!(
+        output.status.code().is_some_and(|code| code < 2),
+        "{}",
+        stderr(&output)
+    );
+    std::fs::write(&file, &bytes).unwrap();
+    assert_eq!(listed(keep.path(), "new"), listed(keep.path(), "h"));
 }
 
 /// Runs a test on a file system with little space, which is removed afterwards.

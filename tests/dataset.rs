@@ -252,7 +252,7 @@ fn complete_exports_have_every_fact_in_tables_and_in_rdf() {
         count(&all, [&property("baseX"), "/state/"]),
         rows(&printed, "states")
     );
-    // The store has only facts that queries ask for.
+    // The graphs of runs have only facts that queries ask for.
     export(&["rdf", "stored.nq"]);
     let stored = read("stored.nq");
     assert_eq!(count(&stored, [&property("minX"), "/state/"]), 0);

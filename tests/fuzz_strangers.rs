@@ -13,13 +13,11 @@ use actcheck::base::{Diagnostics, Files, Source};
 use actcheck::campaign::Env;
 use actcheck::config::{self, Overrides};
 use actcheck::history::merge::{MergeOptions, carry_out, plan};
-use actcheck::history::{CampaignEnd, History, RunFilter};
+use actcheck::history::{History, RunFilter, RunRecord};
 use actcheck::ontology;
 use actcheck::world;
-use oxigraph::model::{Literal, NamedNode, Quad, Term};
-use oxigraph::store::Store;
 
-use crate::fuzz_corpus::entrances::histories;
+use crate::fuzz_corpus::entrances::{frames, histories};
 use crate::history::{sample_campaign, sample_run};
 use crate::support::mutations::{Mutations, cases};
 use crate::support::{actcheck, copy, stderr};
@@ -402,61 +400,108 @@ fn case_files() {
     });
 }
 
-/// Changes some statements of a history's store, and some bytes of a trace.
+/// Texts of a history, and others in their place, which are cut or filled to the same length: so
+/// the frame can still be decoded.
+const REPLACED: [(&str, &[&str]); 5] = [
+    ("c1", &["..", "/x", "  ", "c2", "\u{1b}["]),
+    (
+        "2026-08-01T12:00:00Z",
+        &["9999-99-99T99:99:99Z", "2026-08-01 12:00:00+"],
+    ),
+    ("Pick", &["Pi\u{1b}[", "../x", " "]),
+    (
+        "http://actions#",
+        &["http://<>#\u{1b}[\u{7}", "https://w3id.o"],
+    ),
+    ("glass_1", &["../../x", "glass_2", "\"gl\\\n\t"]),
+];
+
+/// Changes some values of a history, with right checksums, and some bytes without.
 fn damage(history: &Path, random: &mut Mutations) {
-    const IDS: [&str; 6] = ["../../../x", "", "a b", "c1", "c1-1/1", "\u{1b}[2J"];
-    let store = Store::open(history.join("store")).unwrap();
-    let quads: Vec<Quad> = store.iter().map(Result::unwrap).collect();
-    for _ in 0..=random.below(6) {
-        let quad = random.pick(&quads).clone();
-        let mut other = quad.clone();
-        match random.below(5) {
-            0 => drop(store.remove(&quad)),
-            1 => other.object = random.pick(&quads).object.clone(),
-            2 => other.predicate = random.pick(&quads).predicate.clone(),
-            3 => {
-                let namespace = random.pick(&[
-                    "https://w3id.org/actcheck/run/",
-                    "https://w3id.org/actcheck/campaign/",
-                    "http://actions#",
-                ]);
-                let node = NamedNode::new_unchecked(format!("{namespace}{}", random.pick(&IDS)));
-                if random.below(2) == 0 {
-                    other.subject = node.into()
-                } else {
-                    other.object = node.into()
-                }
-            }
-            _ => {
-                let written = other.object.to_string();
-                let text = random.text(
-                    written.as_bytes(),
-                    &["\"", "^^", "1/0", "4/4", "2026-01-01T00:00:00Z"],
-                    &[],
-                );
-                let text = String::from_utf8_lossy(&text)
-                    .chars()
-                    .take(2_000)
-                    .collect::<String>();
-                other.object = match &quad.object {
-                    Term::Literal(literal) => {
-                        Literal::new_typed_literal(text, literal.datatype()).into()
-                    }
-                    _ => Literal::new_simple_literal(text).into(),
-                };
-            }
+    let all: Vec<PathBuf> = ["c1", "c2"]
+        .iter()
+        .flat_map(|id| Files::Disk.list(&history.join("campaigns").join(id)))
+        .collect();
+    for _ in 0..=random.below(3) {
+        let file = random.pick(&all);
+        let bytes = std::fs::read(file).unwrap();
+        let mut contents: Vec<Vec<u8>> = frames::contents(&bytes)
+            .iter()
+            .map(|content| content.to_vec())
+            .collect();
+        if contents.is_empty() {
+            continue;
         }
-        if other != quad {
-            store.remove(&quad).unwrap();
-            store.insert(&other).unwrap();
+        let number = random.below(contents.len());
+        let content = &mut contents[number];
+        match random.below(5) {
+            0..=2 => replace(content, random),
+            3 => *content = random.text(content, &["\u{0}", "\u{7f}"], &[]),
+            _ => *content = random.pick(&frames::contents(&bytes)).to_vec(),
+        }
+        if file.ends_with("campaign") {
+            // Its two copies are equal.
+            let content = content.clone();
+            contents.fill(content);
+        }
+        let written = if random.below(3) == 0 {
+            random.text(&bytes, &["\u{0}", "\u{7f}"], &[])
+        } else {
+            frames::file(&bytes, &contents)
+        };
+        let runs = file.with_extension("runs");
+        if runs != *file && runs.exists() && random.below(2) == 0 {
+            let rows = std::fs::read(&runs).unwrap();
+            std::fs::write(&runs, frames::repointed(&rows, &bytes, &written)).unwrap();
+        }
+        std::fs::write(file, written).unwrap();
+    }
+    // A campaign under the id of another one, or under one that is not an id.
+    if random.below(3) == 0 {
+        let name = *random.pick(&["c3", "a b", "..x", "c1-1", "\u{1b}[2J"]);
+        let campaigns = history.join("campaigns");
+        std::fs::rename(campaigns.join("c1"), campaigns.join(name)).unwrap();
+    }
+}
+
+/// First bytes of a compressed part.
+const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
+
+/// Replaces texts of a content, also in its compressed part, unless that needs a dictionary.
+fn replace(content: &mut Vec<u8>, random: &mut Mutations) {
+    let at = content.windows(ZSTD.len()).position(|part| part == ZSTD);
+    let expanded = at.and_then(|at| {
+        let expanded = zstd::bulk::decompress(&content[at..], 4 << 20).ok()?;
+        Some((at, expanded))
+    });
+    let Some((at, mut expanded)) = expanded else {
+        replace_texts(content, random);
+        return;
+    };
+    // The size before the compressed part remains right.
+    replace_texts(&mut expanded, random);
+    content.truncate(at);
+    content.extend(zstd::bulk::compress(&expanded, 1).unwrap());
+}
+
+/// Replaces a text everywhere, or changes a byte.
+fn replace_texts(content: &mut [u8], random: &mut Mutations) {
+    if content.is_empty() {
+        return;
+    }
+    let (from, others) = random.pick(&REPLACED);
+    let other = random.pick(others).bytes().chain(std::iter::repeat(b' '));
+    let other: Vec<u8> = other.take(from.len()).collect();
+    let mut is_found = false;
+    for at in 0..content.len().saturating_sub(from.len() - 1) {
+        if content[at..].starts_with(from.as_bytes()) {
+            content[at..at + from.len()].copy_from_slice(&other);
+            is_found = true;
         }
     }
-    store.flush().unwrap();
-    drop(store);
-    let traces = Files::Disk.list(&history.join("traces"));
-    if let (Some(file), 0) = (traces.first(), random.below(2)) {
-        let bytes = std::fs::read(file).unwrap();
-        std::fs::write(file, random.text(&bytes, &["\u{0}", "\u{7f}"], &[])).unwrap();
+    if !is_found || random.below(4) == 0 {
+        let at = random.below(content.len());
+        content[at] ^= 1 << random.below(8);
     }
 }
 
@@ -493,7 +538,7 @@ fn merged_histories() {
         }
     }
     let (inner, outer) = (folder.path().join("a/b/c"), folder.path().join("a"));
-    cases("merged histories", 3, |mut random| {
+    cases("merged histories", 12, |mut random| {
         let _ = std::fs::remove_dir_all(&outer);
         std::fs::create_dir_all(&inner).unwrap();
         copy(&made, &inner.join("theirs"));
@@ -511,66 +556,93 @@ fn merged_histories() {
     });
 }
 
-/// The bytes of files of each kind, after the byte that chooses their place.
-fn seeds(folder: &Path) -> Vec<Vec<u8>> {
-    let live = folder.join("live");
-    let history = History::open(&live).unwrap();
-    history.begin_campaign(&sample_campaign("k", 1)).unwrap();
-    (0..3).for_each(|index| history.commit(&sample_run("k", index)).unwrap());
-    (3..6).for_each(|index| history.commit_outline(&sample_run("k", index)).unwrap());
-    let journal = std::fs::read(live.join("journal")).unwrap();
-    history
-        .finish_campaign(
-            "k",
-            &CampaignEnd {
-                ended: "2026-08-01T13:00:00Z".to_owned(),
-                ..CampaignEnd::default()
-            },
-        )
-        .unwrap();
-    drop(history);
-    let (mirror, _) = Mirror::update(&History::open_to_read(&live).unwrap()).unwrap();
+/// The bytes of the file of each place, after the byte that chooses it.
+fn seeds(made: &Path) -> Vec<Vec<u8>> {
+    let folder = tempfile::tempdir().unwrap();
+    copy(made, folder.path());
+    let (mirror, _) = Mirror::update(&History::open_to_read(folder.path()).unwrap()).unwrap();
     let table = mirror.paths().next().unwrap().1.to_path_buf();
-    let outlines = Files::Disk.list(&live.join("outlines"));
-    let traces = Files::Disk.list(&live.join("traces"));
-    let files = [
-        live.join("seal/SUMS"),
-        outlines[0].clone(),
-        traces[0].clone(),
-        live.join("tables/FILES"),
-        table,
-    ];
-    let mut contents: Vec<Vec<u8>> = files
+    let seed = |(number, place): (usize, &&str)| {
+        let file = match *place {
+            "tables/parquet" => table.clone(),
+            place => folder.path().join(place),
+        };
+        let bytes = std::fs::read(&file);
+        assert!(bytes.is_ok() || *place == "tables/RECHECKED", "{place}");
+        Some([vec![number as u8], bytes.ok()?].concat())
+    };
+    histories::PLACES
         .iter()
-        .map(|file| std::fs::read(file).unwrap())
-        .collect();
-    contents.insert(1, journal);
-    let places = [0, 1, 2, 4, 5, 7];
-    places
-        .into_iter()
-        .zip(contents)
-        .map(|(place, bytes)| [vec![place], bytes].concat())
+        .enumerate()
+        .filter_map(seed)
         .collect()
 }
 
 #[test]
 fn history_files() {
     let folder = tempfile::tempdir().unwrap();
-    let seeds = seeds(folder.path());
     let made = folder.path().join("made");
-    histories::made(&made);
+    let runs: Vec<RunRecord> = (0..6).map(|index| sample_run("k", index)).collect();
+    histories::made(&made, &runs);
+    let seeds = seeds(&made);
     let others: Vec<&[u8]> = seeds.iter().map(Vec::as_slice).collect();
-    cases("files of histories", 18, |mut random| {
-        let seed = random.below(seeds.len());
-        let seed = &seeds[seed];
-        let mut bytes = random.text(&seed[1..], &["\u{0}", "\u{7f}", "PAR1"], &others);
-        // With wrong or with correct checksums.
-        let places = histories::PLACES.len() as u8;
-        bytes.insert(0, seed[0] + if random.below(3) == 0 { places } else { 0 });
+    cases("files of histories", 36, |mut random| {
+        let seed = random.pick(&seeds);
+        let mut bytes = mutated(&seed[1..], &mut random, &others);
+        // With right checksums, as they are, or with runs that have the places of the frames.
+        let way = random.below(histories::WAYS);
+        bytes.insert(0, seed[0] + (way * histories::PLACES.len()) as u8);
         if let Err(found) = histories::history(&made, &bytes) {
             show(&found);
         }
     });
+    // The entry point restores the files that it replaces.
+    let history = History::open_to_read(&made).unwrap();
+    assert_eq!(history.runs(&RunFilter::default()).unwrap().len(), 6);
+    assert!(History::examine(&made).unwrap().0.damage.is_empty());
+}
+
+/// A file with other bytes: with mutations anywhere, a flipped bit, cut, or with frames that are
+/// random, repeated, of another file, or in another order.
+fn mutated(bytes: &[u8], random: &mut Mutations, others: &[&[u8]]) -> Vec<u8> {
+    let mut out = bytes.to_vec();
+    let mut frames_of: Vec<Vec<u8>> = frames::contents(bytes)
+        .iter()
+        .map(|content| content.to_vec())
+        .collect();
+    let (one, other) = (random.below(frames_of.len()), random.below(frames_of.len()));
+    match random.below(7) {
+        0 if !out.is_empty() => {
+            let at = random.below(out.len());
+            out[at] ^= 1 << random.below(8);
+        }
+        1 => out.truncate(random.below(out.len())),
+        2 | 3 if !frames_of.is_empty() => {
+            let content = &frames_of[one];
+            frames_of[one] = match random.below(2) {
+                0 => random.text(content, &["\u{0}", "\u{7f}"], others),
+                _ => (0..random.below(300))
+                    .map(|_| random.below(256) as u8)
+                    .collect(),
+            };
+            out = frames::file(bytes, &frames_of);
+        }
+        4 if !frames_of.is_empty() => {
+            let spliced = frames::contents(&random.pick(others)[1..]);
+            let content = match spliced.first() {
+                Some(content) if random.below(2) == 0 => content.to_vec(),
+                _ => frames_of[one].clone(),
+            };
+            frames_of.insert(other, content);
+            out = frames::file(bytes, &frames_of);
+        }
+        5 if !frames_of.is_empty() => {
+            frames_of.swap(one, other);
+            out = frames::file(bytes, &frames_of);
+        }
+        _ => out = random.text(bytes, &["\u{0}", "\u{7f}", "PAR1"], others),
+    }
+    out
 }
 
 /// Folders of launches, and caches, in a project.
@@ -591,7 +663,7 @@ fn launches_and_caches() {
             "locks",
             "logs",
             "shards/1/hulls",
-            "shards/1/traces",
+            "shards/1/campaigns/k",
         ] {
             std::fs::create_dir_all(launch.join(name)).unwrap();
         }

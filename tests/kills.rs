@@ -64,6 +64,8 @@ fn intact(dir: &Path, place: &str) -> Vec<String> {
         stderr(&output)
     );
     let history = History::open_to_read(dir).unwrap();
+    let warning = history.tail_warning().unwrap();
+    assert!(warning.is_none(), "{place}: {warning:?}");
     history
         .runs(&RunFilter::default())
         .unwrap()

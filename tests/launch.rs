@@ -6,6 +6,8 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use actcheck::history::History;
+
 use crate::support::look::looking;
 use crate::support::{actcheck, edit, stderr, stdout};
 
@@ -70,10 +72,6 @@ fn until(condition: impl Fn() -> bool) {
     }
 }
 
-fn traces(dir: &Path) -> usize {
-    fs::read_dir(dir.join("traces")).map_or(0, Iterator::count)
-}
-
 #[test]
 fn a_launch_equals_one_campaign() {
     let project = looking();
@@ -123,13 +121,13 @@ fn a_task_may_be_started_any_number_of_times() {
     let shard = folder.join("parts.launch/shards/2");
     let task = ["launch-task", "parts.launch", "2"];
     let mut child = start(folder, &task);
-    until(|| traces(&shard) > 0 || folder.join("parts.launch/done/2").exists());
+    until(|| History::count_runs(&shard) > 0 || folder.join("parts.launch/done/2").exists());
     child.kill().unwrap();
     child.wait().unwrap();
     for _ in 0..2 {
         let output = actcheck(folder, &task);
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-        assert_eq!(traces(&shard), 3);
+        assert_eq!(History::count_runs(&shard), 3);
     }
     actcheck(folder, &LAUNCH);
     assert_eq!(listed(folder, "parts"), listed(folder, "whole"));

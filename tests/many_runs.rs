@@ -1,4 +1,4 @@
-//! Histories of many runs: merged shards keep their files, lists are read a part at a time, and
+//! Histories of many runs: merged shards take the same space, lists are read a part at a time, and
 //! reports have a sample.
 
 use std::collections::BTreeSet;
@@ -21,7 +21,6 @@ use crate::support::chromium::Chromium;
 use crate::support::{actcheck, paged, stderr, stdout};
 
 const SHARDS: u64 = 3;
-/// Two files of outlines in each shard.
 const RUNS: u64 = 600;
 
 /// One of this many runs is kept whole.
@@ -43,39 +42,40 @@ fn make(dir: &Path, shard: Option<Shard>) -> History {
     let own: Vec<u64> = (0..RUNS)
         .filter(|index| shard.is_none_or(|shard| shard.has(*index)))
         .collect();
-    let (whole, outlines): (Vec<u64>, Vec<u64>) =
+    let (whole, others): (Vec<u64>, Vec<u64>) =
         own.into_iter().partition(|index| index % WHOLE == 7);
     whole
         .into_iter()
         .for_each(|index| history.commit(&sample_run("k", index)).unwrap());
-    for indices in outlines.chunks(128) {
+    for indices in others.chunks(128) {
         let runs: Vec<RunRecord> = indices
             .iter()
             .map(|index| sample_run("k", *index))
             .collect();
-        history.commit_outlines("k", &runs).unwrap();
+        history.commit_all_outcomes("k", &runs).unwrap();
     }
     history.finish_campaign("k", &end()).unwrap();
     history
 }
 
-fn names(folder: &Path, ending: &str) -> BTreeSet<String> {
-    let entries = std::fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name().into_string().unwrap());
-    entries.filter(|name| name.ends_with(ending)).collect()
+/// Size of the columns of all runs. Unit: bytes.
+fn size(history: &Path) -> u64 {
+    let files = std::fs::read_dir(history.join("campaigns/k")).unwrap();
+    files
+        .map(|entry| entry.unwrap().metadata().unwrap().len())
+        .sum()
 }
 
 #[test]
-fn files_of_shards_become_files_of_the_merged_history() {
+fn runs_of_shards_become_runs_of_the_merged_history() {
     let folder = tempfile::tempdir().unwrap();
     let alone = make(&folder.path().join("alone"), None);
-    let mut files = BTreeSet::new();
+    let mut sizes = 0;
     for number in 1..=SHARDS {
         let dir = folder.path().join(number.to_string());
         let shard = make(&dir, Shard::new(number, SHARDS));
         Mirror::update(&shard).unwrap();
-        files.extend(names(&dir.join("outlines"), ".outlines"));
+        sizes += size(&dir);
     }
     let open =
         |number: u64| History::open_to_read(&folder.path().join(number.to_string())).unwrap();
@@ -84,10 +84,8 @@ fn files_of_shards_become_files_of_the_merged_history() {
     let planned = plan(&sources, Some(&into), &MergeOptions::default()).unwrap();
     let merged = carry_out(&planned, &sources, &into, &AtomicBool::new(false), || ()).unwrap();
     assert_eq!((merged.runs, merged.interrupted), (RUNS, false));
-    assert_eq!(
-        names(&folder.path().join("all/outlines"), ".outlines"),
-        files
-    );
+    let merged_size = size(&folder.path().join("all"));
+    assert!(merged_size < sizes + sizes / 10, "{merged_size} of {sizes}");
     assert_eq!(
         Mirror::adopt(&planned, &sources, &into).unwrap() as u64,
         SHARDS
@@ -118,10 +116,12 @@ fn files_of_shards_become_files_of_the_merged_history() {
             "{run}"
         );
     }
-    let mut ids: Vec<String> = runs.iter().map(|run| run.run.clone()).collect();
-    into.sort_as_stored("k", &mut ids).unwrap();
-    assert_eq!(ids.iter().collect::<BTreeSet<_>>().len(), RUNS as usize);
-    assert_ne!(ids[1], "k-2", "a file has every third run");
+    for index in [7, 57, 58] {
+        let run = format!("k-{}", index + 1);
+        assert_eq!(into.is_whole(&run).unwrap(), index % WHOLE == 7);
+        assert_eq!(into.recorded(&run).unwrap(), alone.recorded(&run).unwrap());
+    }
+    assert_eq!(History::count_runs(into.dir()), RUNS);
 
     // Once more: nothing is added, and nothing is lost.
     drop(mirror);
@@ -136,29 +136,34 @@ fn files_of_shards_become_files_of_the_merged_history() {
 }
 
 #[test]
-fn a_damaged_file_of_a_shard_is_not_copied() {
+fn a_damaged_run_of_a_shard_is_not_copied() {
     let folder = tempfile::tempdir().unwrap();
     let dir = folder.path().join("1");
     drop(make(&dir, Shard::new(1, SHARDS)));
-    let file = dir
-        .join("outlines")
-        .join(names(&dir.join("outlines"), ".outlines").first().unwrap());
-    let mut bytes = std::fs::read(&file).unwrap();
-    let last = bytes.len() - 1;
-    bytes[last] ^= 1;
-    std::fs::write(&file, bytes).unwrap();
-    let sources = [History::open_to_read(&dir).unwrap()];
-    let into = History::open(&folder.path().join("all")).unwrap();
-    let planned = plan(&sources, Some(&into), &MergeOptions::default()).unwrap();
-    let faults = carry_out(&planned, &sources, &into, &AtomicBool::new(false), || ()).unwrap_err();
-    assert_eq!(faults.iter().next().unwrap().code, "H007");
-    assert!(
-        !folder
-            .path()
-            .join("all/outlines")
-            .join(file.file_name().unwrap())
-            .exists()
-    );
+    for extension in ["details", "states", "motion", "runs"] {
+        let file = dir.join("campaigns/k/0001").with_extension(extension);
+        let whole = std::fs::read(&file).unwrap();
+        let mut bytes = whole.clone();
+        let last = bytes.len() - 1;
+        bytes[last] ^= 1;
+        std::fs::write(&file, bytes).unwrap();
+        let all = folder.path().join(format!("all but {extension}"));
+        let into = History::open(&all).unwrap();
+        let merged = History::open_to_read(&dir).and_then(|source| {
+            let sources = [source];
+            let planned = plan(&sources, Some(&into), &MergeOptions::default())?;
+            carry_out(&planned, &sources, &into, &AtomicBool::new(false), || ())
+        });
+        let faults = merged.unwrap_err();
+        assert_eq!(faults.iter().next().unwrap().code, "H007", "{faults}");
+        drop(into);
+        // Whatever was copied before is intact, and the campaign has no end.
+        let (found, into) = History::examine(&all).unwrap();
+        assert!(found.damage.is_empty(), "{extension}: {found:?}");
+        let campaigns = into.campaigns().unwrap();
+        assert!(campaigns.iter().all(|campaign| campaign.ended.is_none()));
+        std::fs::write(&file, whole).unwrap();
+    }
 }
 
 #[test]
@@ -173,7 +178,7 @@ fn lists_of_many_runs_are_printed_in_parts() {
             .iter()
             .map(|index| sample_run("k", *index))
             .collect();
-        history.commit_outlines("k", &runs).unwrap();
+        history.commit_all_outcomes("k", &runs).unwrap();
     }
     history.finish_campaign("k", &end()).unwrap();
     drop(history);

@@ -525,7 +525,7 @@ fn later_judgements_and_shrunk_runs_are_merged_under_new_names() {
 }
 
 #[test]
-fn outlines_are_merged_as_whole_runs_are() {
+fn runs_kept_as_outcomes_are_merged_as_whole_runs_are() {
     merge_of_judgements("\n[history]\nkeep = \"outcomes\"\n");
 }
 
@@ -657,12 +657,23 @@ fn a_single_history_is_copied_completely() {
     let output = actcheck(folder, &["merge", "a", "b", "a", "--into", "all"]);
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert!(quads(&open(folder, "all")) == wanted);
-    std::fs::remove_file(folder.join("b/traces/z2-1.trace")).unwrap();
-    let output = actcheck(folder, &["merge", "b", "--into", "lossy"]);
-    assert_eq!(output.status.code(), Some(0));
-    assert!(
-        stderr(&output).contains("1 runs had no trace before the merge, the first is z2-1"),
-        "{}",
-        stderr(&output)
-    );
+    // No run is lost in silence.
+    for extension in ["details", "states", "motion"] {
+        let file = folder.join("b/campaigns/z2/0001").with_extension(extension);
+        let column = std::fs::read(&file).unwrap();
+        std::fs::remove_file(&file).unwrap();
+        let output = actcheck(folder, &["merge", "b", "--into", "lossy"]);
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{extension}: {said}");
+        assert!(
+            (said.contains("H007") || said.contains("H009")) && said.contains(extension),
+            "{extension}: {said}"
+        );
+        std::fs::write(&file, column).unwrap();
+        if folder.join("lossy").exists() {
+            let (found, _) = History::examine(&folder.join("lossy")).unwrap();
+            assert!(found.damage.is_empty(), "{extension}: {found:?}");
+            std::fs::remove_dir_all(folder.join("lossy")).unwrap();
+        }
+    }
 }

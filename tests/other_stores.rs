@@ -23,7 +23,8 @@ use crate::support::{
 
 const NODE: &str = "https://w3id.org/.well-known/genid/actcheck/";
 
-/// A private copy of a history with whole runs, outlines, and judgements made later about both.
+/// A private copy of a history with runs kept whole and as outcomes, and judgements made later about
+/// both.
 fn history() -> TempDir {
     static MADE: OnceLock<PathBuf> = OnceLock::new();
     let made = MADE.get_or_init(|| {

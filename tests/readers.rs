@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use actcheck::history::{CampaignEnd, History, NewestJudgements, RunFilter};
+use actcheck::base::Term;
+use actcheck::history::{CampaignEnd, History, NewestJudgements, QueryAnswer, RunFilter};
 
 use crate::history::{sample_campaign, sample_run};
 use crate::support::foreign::left_out;
@@ -86,8 +87,7 @@ fn a_reader_sees_the_state_of_its_opening_while_the_history_grows() {
     let reader = History::open_to_read(&dir).unwrap();
     assert_eq!(runs(&reader), 3);
     assert!(!reader.refresh().unwrap());
-    // The owner writes, flushes, merges its tables and removes old ones; the reader still reads all
-    // of its own.
+    // The owner writes and flushes; the reader still reads its own state.
     for round in 0..6 {
         owner.commit(&sample_run("a1", 3 + round)).unwrap();
         owner.flush().unwrap();
@@ -100,6 +100,12 @@ fn a_reader_sees_the_state_of_its_opening_while_the_history_grows() {
     drop(owner);
     drop(History::open_existing(&dir).unwrap());
     assert_eq!(runs(&reader), 3);
+    let stored =
+        |history: &History| match history.query("SELECT (COUNT(*) AS ?n) { ?run a act:Run }") {
+            Ok(QueryAnswer::Table { rows, .. }) => rows[0][0].clone(),
+            other => panic!("{other:?}"),
+        };
+    assert_eq!(stored(&reader), Some(Term::Integer(3)));
     reader.write_nquads(&folder.path().join("all.nq")).unwrap();
     assert!(
         std::fs::read_to_string(folder.path().join("all.nq"))
@@ -108,8 +114,49 @@ fn a_reader_sees_the_state_of_its_opening_while_the_history_grows() {
             .count()
             > 100
     );
-    assert!(reader.refresh().unwrap());
-    assert_eq!(runs(&reader), 9);
+    assert!(reader.is_stale() && reader.refresh().unwrap() && !reader.is_stale());
+    assert_eq!(
+        (runs(&reader), stored(&reader)),
+        (9, Some(Term::Integer(9)))
+    );
+}
+
+/// Each answer is of a moment at which the owner had stored so many runs, and no part is of another.
+#[test]
+fn a_reader_beside_a_writing_thread_sees_whole_runs() {
+    const RUNS: u64 = 60;
+    let folder = tempfile::tempdir().unwrap();
+    let dir = folder.path().join("h");
+    let owner = History::open(&dir).unwrap();
+    owner.begin_campaign(&sample_campaign("a1", 1)).unwrap();
+    std::thread::scope(|scope| {
+        scope.spawn(move || {
+            for index in 0..RUNS {
+                let run = sample_run("a1", index);
+                if index % 2 == 0 {
+                    owner.commit(&run).unwrap()
+                } else {
+                    owner.commit_outcomes(&run).unwrap()
+                }
+            }
+            owner
+                .finish_campaign("a1", &CampaignEnd::default())
+                .unwrap();
+        });
+        let mut before = 0;
+        while before < RUNS as usize {
+            let reader = History::open_to_read(&dir).unwrap();
+            let rows = reader.runs(&RunFilter::default()).unwrap();
+            assert!(rows.len() >= before && reader.tail_warning().unwrap().is_none());
+            before = rows.len();
+            let outcomes = reader.outcomes(&RunFilter::default()).unwrap();
+            assert_eq!(outcomes.len(), 5 * before);
+            if let Some(row) = rows.last() {
+                assert_eq!(reader.run(&row.run).unwrap().actions[0].judgements.len(), 5);
+                assert!(reader.recorded(&row.run).is_ok());
+            }
+        }
+    });
 }
 
 #[test]
@@ -126,7 +173,7 @@ fn a_reader_does_not_keep_others_from_writing() {
     assert_eq!(runs(&reader), 1);
 }
 
-/// Readers that met a half-created store called it damaged.
+/// Readers that met a half-created history called it damaged.
 #[test]
 fn a_reader_waits_until_a_new_history_is_created() {
     let folder = tempfile::tempdir().unwrap();
@@ -241,10 +288,9 @@ fn a_run_starts_and_ends_beside_readers_in_a_loop() {
     assert_eq!(runs(&History::open_to_read(&dir).unwrap()), 7);
 }
 
-/// A reader loads the statements of a run from the journal when they are asked for: others may have
-/// more than the first one.
+/// Judgements were looked for only under the properties of the first run.
 #[test]
-fn a_property_that_only_some_waiting_runs_have_is_found_in_these() {
+fn a_property_that_only_some_runs_have_is_found_in_these() {
     let folder = tempfile::tempdir().unwrap();
     let writer = History::open(folder.path()).unwrap();
     writer.begin_campaign(&sample_campaign("k", 2)).unwrap();

@@ -12,8 +12,9 @@ use actcheck::history::{History, QueryAnswer, Recheck, RunFilter, RunStatus};
 use serde_json::Value;
 use tempfile::TempDir;
 
+use crate::fuzz_corpus::entrances::frames;
 use crate::history::{sample_campaign, sample_run};
-use crate::support::{actcheck, copy, copy_open, edit, project, root, stderr, stdout};
+use crate::support::{actcheck, copy, edit, project, root, stderr, stdout};
 
 const NEW_RULE: &str = "
 @prefix act: <http://actions#> .
@@ -516,10 +517,9 @@ fn a_stopped_recheck_keeps_whole_batches_and_can_continue() {
     );
 }
 
-/// New judgements go to the tables of the store together, at the end. Readers see them before, and
-/// so does the next owner if this one is killed.
+/// Readers see new judgements at once, and so does the next owner if this one is killed.
 #[test]
-fn judgements_that_are_not_in_tables_yet_are_read_and_survive_a_kill() {
+fn judgements_are_read_at_once_and_survive_a_kill() {
     let (folder, history, rules) = filled(6);
     let rules = rules.only(&["StaysUpright".to_owned()]).unwrap();
     let runs = history.runs(&RunFilter::default()).unwrap();
@@ -531,16 +531,94 @@ fn judgements_that_are_not_in_tables_yet_are_read_and_survive_a_kill() {
     history
         .commit_rechecks(&judged(&history), "2026-08-02T12:00:00Z")
         .unwrap();
-    assert!(folder.path().join("h/journal").exists());
     assert_eq!(kept(&History::open_to_read(history.dir()).unwrap()), 6);
     let left = folder.path().join("left");
-    copy_open(history.dir(), &left);
+    copy(history.dir(), &left);
     let next = History::open(&left).unwrap();
     for history in [next, history] {
         assert!(!judged(&history).iter().any(Recheck::is_news));
         assert_eq!(kept(&history), 6);
         history.finish_rechecks().unwrap();
-        assert!(!history.dir().join("journal").exists());
+        let dir = history.dir().to_owned();
+        drop(history);
+        assert_eq!(kept(&History::open_to_read(&dir).unwrap()), 6);
+        assert!(History::examine(&dir).unwrap().0.damage.is_empty());
+    }
+}
+
+/// A batch of judgements is stored completely or not at all, and the next process makes it again.
+#[test]
+fn half_a_batch_of_judgements_is_none() {
+    let (folder, history, rules) = filled(6);
+    let rules = rules.only(&["StaysUpright".to_owned()]).unwrap();
+    let runs = history.runs(&RunFilter::default()).unwrap();
+    let (judged, _) = judge_stored(&history, &runs, &rules, 1, &AtomicBool::new(false)).unwrap();
+    for batch in judged.chunks(4) {
+        history
+            .commit_rechecks(batch, "2026-08-02T12:00:00Z")
+            .unwrap();
+    }
+    assert_eq!(kept(&history), 6);
+    // Its process is killed.
+    let dir = folder.path().join("killed");
+    copy(history.dir(), &dir);
+    drop(history);
+    let files = Files::Disk.list(&dir.join("campaigns/k"));
+    let file = files
+        .into_iter()
+        .find(|file| file.extension().is_some_and(|own| own == "judgements"))
+        .unwrap();
+    let whole = std::fs::read(&file).unwrap();
+    let ends = frames::ends(&whole);
+    assert_eq!((ends.len(), ends.last()), (2, Some(&whole.len())));
+    for length in [ends[1] - 1, ends[0] + 3] {
+        std::fs::write(&file, &whole[..length]).unwrap();
+        let reader = History::open_to_read(&dir).unwrap();
+        assert_eq!(kept(&reader), 4, "{length}");
+        // They may have been reported.
+        assert!(reader.tail_warning().unwrap().is_some(), "{length}");
+        let (found, _) = History::examine(&dir).unwrap();
+        assert!(found.damage.is_empty(), "{length}: {found:?}");
+        let left = folder.path().join(format!("left {length}"));
+        copy(&dir, &left);
+        let next = History::open_existing(&left).unwrap();
+        let (end, again) = judge(&next, &rules, 2, usize::MAX);
+        assert!(matches!(end.ending, Ending::Finished), "{end:?}");
+        assert_eq!(again.iter().filter(|recheck| recheck.is_news()).count(), 2);
+        assert_eq!(kept(&next), 6);
+        drop(next);
+        assert_eq!(kept(&History::open_to_read(&left).unwrap()), 6);
+    }
+    // A flipped bit is damage, and salvaging loses no run.
+    for at in [
+        2,
+        frames::HEAD + 1,
+        ends[0] - 1,
+        ends[0] + 5,
+        whole.len() - 1,
+    ] {
+        let mut bytes = whole.clone();
+        bytes[at] ^= 2;
+        std::fs::write(&file, bytes).unwrap();
+        let (found, _) = History::examine(&dir).unwrap();
+        let name = file.strip_prefix(&dir).unwrap();
+        assert!(
+            found.damage.iter().any(|damage| damage.file == name),
+            "byte {at}: {found:?}"
+        );
+        let read = History::open_to_read(&dir)
+            .and_then(|history| history.newest_outcomes(&RunFilter::default()));
+        let fault = read.map(drop).unwrap_err().to_string();
+        assert!(
+            fault.starts_with("H007") && fault.contains(".judgements"),
+            "byte {at}: {fault}"
+        );
+        let (salvaged, lost) = History::open_to_salvage(&dir).unwrap();
+        assert!(lost.is_empty(), "byte {at}: {lost:?}");
+        assert_eq!(salvaged.runs(&RunFilter::default()).unwrap().len(), 6);
+        if at >= ends[0] {
+            assert_eq!(kept(&salvaged), 4, "byte {at}");
+        }
     }
 }
 
@@ -584,26 +662,30 @@ fn broken_and_timed_out_actions_keep_their_outcomes() {
 
 #[test]
 fn an_unreadable_run_does_not_stop_the_others() {
-    let (folder, history, rules) = filled(6);
-    std::fs::remove_file(folder.path().join("h/traces/k-3.trace")).unwrap();
-    std::fs::write(folder.path().join("h/traces/k-5.trace"), "no trace").unwrap();
+    let (_folder, history, rules) = filled(6);
+    // Frames of other runs are readable, unless the first one is damaged.
+    let file = history.dir().join("campaigns/k/0001.states");
+    let mut bytes = std::fs::read(&file).unwrap();
+    let ends = frames::ends(&bytes);
+    for run in [3, 5] {
+        bytes[ends[run - 1] - 1] ^= 1;
+    }
+    std::fs::write(&file, bytes).unwrap();
     let (end, judged) = judge(&history, &rules, 2, usize::MAX);
     assert!(
         matches!(end.ending, Ending::Finished) && end.judged == 4,
         "{end:?}"
     );
     let codes: Vec<&str> = end.faults.iter().map(|fault| fault.code).collect();
-    assert_eq!(codes, ["H009", "H007"]);
+    assert_eq!(codes, ["H007", "H007"]);
     assert!(
         judged
             .iter()
             .all(|recheck| !["k-3", "k-5"].contains(&recheck.run.as_str()))
     );
+    let project = history.dir().parent().unwrap().to_owned();
     drop(history);
-    let output = actcheck(
-        folder.path(),
-        &["recheck", "--history", "h", "--format", "csv"],
-    );
+    let output = actcheck(&project, &["recheck", "--history", "h", "--format", "csv"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(
         stderr(&output).contains("k-3") && stderr(&output).contains("k-5"),

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use actcheck::history::History;
 use serde_json::Value;
 
 use crate::support::look::looking;
@@ -44,8 +45,9 @@ fn listed(folder: &Path, history: &str) -> String {
     stdout(&output)
 }
 
-fn traces(folder: &Path, history: &str) -> usize {
-    std::fs::read_dir(folder.join(history).join("traces")).map_or(0, Iterator::count)
+/// The number of stored runs.
+fn stored(folder: &Path, history: &str) -> u64 {
+    History::count_runs(&folder.join(history))
 }
 
 /// The summary without its paths: all outcomes, margins, witnesses, scores and discards.
@@ -111,7 +113,7 @@ fn twenty_kills_do_not_change_the_results() {
         let mut before = 0;
         while kills < 20 && before < 20 {
             // A campaign that was killed before it was recorded can't be resumed, only started.
-            let begun = folder.join(&history).join("store").exists() && {
+            let begun = folder.join(&history).join("VERSION").exists() && {
                 let asked = "SELECT ?c WHERE { ?c a act:Campaign }";
                 let known = actcheck(
                     folder,
@@ -127,7 +129,7 @@ fn twenty_kills_do_not_change_the_results() {
             // the test ends.
             let started = Instant::now();
             while state % 3 != 0
-                && traces(folder, &history) <= before
+                && stored(folder, &history) <= before
                 && started.elapsed() < Duration::from_secs(60)
             {
                 std::thread::sleep(Duration::from_millis(5));
@@ -139,7 +141,7 @@ fn twenty_kills_do_not_change_the_results() {
             child.kill().unwrap();
             child.wait().unwrap();
             kills += 1;
-            before = traces(folder, &history);
+            before = stored(folder, &history);
         }
         let resumed = actcheck(folder, &[&go_on[..], &["--format", "json"]].concat());
         let text = stdout(&resumed);
@@ -164,10 +166,19 @@ fn twenty_kills_do_not_change_the_results() {
             expected_discards,
             "round {round}"
         );
-        let left = std::fs::read_dir(folder.join(&history).join("traces"))
-            .unwrap()
-            .count();
-        assert_eq!(left, 24, "traces without runs were left in round {round}");
+        assert_eq!(
+            stored(folder, &history),
+            24,
+            "a run was stored twice, or was lost, in round {round}"
+        );
+        let (found, read) = History::examine(&folder.join(&history)).unwrap();
+        assert_eq!(
+            (found.damage, found.runs),
+            (Vec::new(), 24),
+            "round {round}"
+        );
+        let warning = read.tail_warning().unwrap();
+        assert!(warning.is_none(), "round {round}: {warning:?}");
     }
     println!("{kills} kills in {round} campaigns");
 }
@@ -227,7 +238,7 @@ fn interrupted_and_resumed(folder: &Path, options: &[&str]) -> Value {
     .concat();
     let mut child = start(folder, &begin);
     let started = Instant::now();
-    while traces(folder, "h") < 2 {
+    while stored(folder, "h") < 2 {
         assert!(
             started.elapsed() < Duration::from_secs(120),
             "no runs in two minutes"
@@ -310,7 +321,7 @@ fn campaigns_that_cannot_resume_are_refused_with_the_reason() {
         ],
     );
     let started = Instant::now();
-    while traces(folder, "h") < 2 {
+    while stored(folder, "h") < 2 {
         assert!(
             started.elapsed() < Duration::from_secs(120),
             "no runs in two minutes"

@@ -11,6 +11,7 @@ use actcheck::base::Outcome;
 use actcheck::campaign::{Env, Planned, PropertyOutcome, RunResult, Schedule, schedule_of};
 use actcheck::config::Overrides;
 use actcheck::data::{Choice, ChoiceKind, ChoiceName, StartAxis};
+use actcheck::history::History;
 use actcheck::scenario;
 use actcheck::search::{GENERATION, Strategy};
 
@@ -263,7 +264,7 @@ fn a_guided_campaign_is_the_same_with_any_number_of_workers() {
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    while std::fs::read_dir(folder.join("three/traces")).map_or(0, Iterator::count) < 8 {
+    while History::count_runs(&folder.join("three")) < 8 {
         assert!(
             child.try_wait().unwrap().is_none(),
             "it must not end before it is killed"

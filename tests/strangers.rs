@@ -10,11 +10,10 @@ use actcheck::base::{Diagnostics, Files, Source};
 use actcheck::config::{self, Overrides};
 use actcheck::history::{CampaignRecord, History};
 use actcheck::ontology;
-use oxigraph::model::{GraphName, NamedNode, NamedOrBlankNode, Quad, Term};
-use oxigraph::store::Store;
 
+use crate::fuzz_corpus::entrances::frames;
 use crate::history::{sample_campaign, sample_run};
-use crate::support::{actcheck, script, signal, stderr, stdout};
+use crate::support::{actcheck, copy, script, signal, stderr, stdout};
 
 /// The diagnostics of a program that refuses its input.
 fn refused(folder: &Path, arguments: &[&str]) -> String {
@@ -48,85 +47,96 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// Replaces a campaign's id in every IRI of a history's store.
-fn rename_campaign(history: &Path, from: &str, to: &str) {
-    let store = Store::open(history.join("store")).unwrap();
-    let new = |iri: &str| {
-        let renamed = iri.replace(&format!("/campaign/{from}"), &format!("/campaign/{to}"));
-        NamedNode::new_unchecked(renamed.replace(&format!("/run/{from}-"), &format!("/run/{to}-")))
-    };
-    let quads: Vec<Quad> = store.iter().map(Result::unwrap).collect();
-    store.clear().unwrap();
-    for quad in quads {
-        let subject = match quad.subject {
-            NamedOrBlankNode::NamedNode(node) => new(node.as_str()).into(),
-            blank => blank,
-        };
-        let object = match quad.object {
-            Term::NamedNode(node) => new(node.as_str()).into(),
-            other => other,
-        };
-        let graph = match quad.graph_name {
-            GraphName::NamedNode(node) => new(node.as_str()).into(),
-            other => other,
-        };
-        store
-            .insert(&Quad::new(subject, quad.predicate, object, graph))
-            .unwrap();
+/// Gives a campaign another id of the same length: the name of its folder, and the text in its
+/// record if it is there. Returns whether anything has changed.
+fn rename_campaign(history: &Path, from: &str, to: &str) -> bool {
+    let campaigns = history.join("campaigns");
+    let file = campaigns.join(from).join("campaign");
+    let bytes = std::fs::read(&file).unwrap();
+    assert_eq!(from.len(), to.len());
+    let renamed: Vec<Vec<u8>> = frames::contents(&bytes)
+        .iter()
+        .map(|content| {
+            let mut content = content.to_vec();
+            for at in 0..content.len().saturating_sub(from.len() - 1) {
+                if content[at..].starts_with(from.as_bytes()) {
+                    content[at..at + to.len()].copy_from_slice(to.as_bytes());
+                }
+            }
+            content
+        })
+        .collect();
+    let written = frames::file(&bytes, &renamed);
+    let has_id = written != bytes;
+    std::fs::write(&file, written).unwrap();
+    // A name with a slash can't be that of a folder.
+    if !to.contains('/') {
+        std::fs::rename(campaigns.join(from), campaigns.join(to)).unwrap();
     }
-    store.flush().unwrap();
+    has_id || !to.contains('/')
 }
 
 /// `merge` named a run's file after the campaign's id in the source, wherever that led.
 #[test]
 fn an_id_of_a_foreign_history_does_not_lead_out_of_a_folder() {
-    let folder = tempfile::tempdir().unwrap();
-    let inside = folder.path().join("in/side");
-    std::fs::create_dir_all(&inside).unwrap();
+    let made = tempfile::tempdir().unwrap();
     {
-        let history = History::open(&inside.join("theirs")).unwrap();
-        history.begin_campaign(&sample_campaign("c1", 1)).unwrap();
-        history.commit(&sample_run("c1", 0)).unwrap();
-        let odd = CampaignRecord {
-            id: "../../../x".to_owned(),
-            ..sample_campaign("c2", 2)
-        };
-        let found = history.begin_campaign(&odd).unwrap_err();
-        assert!(found.to_string().contains("H026"), "{found}");
+        let history = History::open(&made.path().join("theirs")).unwrap();
+        history
+            .begin_campaign(&sample_campaign("campaignxx", 1))
+            .unwrap();
+        history.commit(&sample_run("campaignxx", 0)).unwrap();
+        for id in ["../../../x", "..", ".", "", "a/b", "a b", "a\u{0}"] {
+            let odd = CampaignRecord {
+                id: id.to_owned(),
+                ..sample_campaign("c2", 2)
+            };
+            let found = history.begin_campaign(&odd).unwrap_err();
+            assert!(found.to_string().contains("H026"), "{found}");
+        }
     }
-    rename_campaign(&inside.join("theirs"), "c1", "../../../x");
-    let before: Vec<PathBuf> = files(folder.path())
-        .into_iter()
-        .filter(|file| !file.starts_with(&inside))
-        .collect();
-    for arguments in [
-        &["merge", "theirs", "--into", "ours"][..],
-        &["list", "--history", "theirs"],
-        &["analyse", "--history", "theirs"],
-        &["report", "--history", "theirs", "--html", "r.html"],
-        &[
-            "export",
-            "run",
-            "../../../x-1",
-            "-o",
-            "case.toml",
-            "--history",
-            "theirs",
-        ],
-        &["run", "--resume", "--history", "theirs"],
-        &["recheck", "--history", "theirs"],
-    ] {
-        let said = refused(&inside, arguments);
-        assert!(
-            said.contains("H026") && said.contains("../../../x"),
-            "{arguments:?}: {said}"
-        );
+    // The record names another folder than its own; a folder has a name that is not an id.
+    for id in ["../../../x", "campaign y", "..campaign", "\u{1b}[2Jpaign"] {
+        let folder = tempfile::tempdir().unwrap();
+        let inside = folder.path().join("in/side");
+        copy(made.path(), &inside);
+        if !rename_campaign(&inside.join("theirs"), "campaignxx", id) {
+            continue;
+        }
+        let before: Vec<PathBuf> = files(folder.path())
+            .into_iter()
+            .filter(|file| !file.starts_with(&inside))
+            .collect();
+        let run = format!("{id}-1");
+        for arguments in [
+            &["merge", "theirs", "--into", "ours"][..],
+            &["list", "--history", "theirs"],
+            &["analyse", "--history", "theirs"],
+            &["report", "--history", "theirs", "--html", "r.html"],
+            &[
+                "export",
+                "run",
+                &run,
+                "-o",
+                "case.toml",
+                "--history",
+                "theirs",
+            ],
+            &["run", "--resume", "--history", "theirs"],
+            &["recheck", "--history", "theirs"],
+        ] {
+            let said = refused(&inside, arguments);
+            // A record that names another folder may be damage.
+            let is_refused = said.contains("H026") || id.contains('/') && said.contains("H007");
+            let is_named = said.contains(id) || id.contains('\u{1b}');
+            assert!(is_refused && is_named, "{id:?} {arguments:?}: {said}");
+        }
+        let after: Vec<PathBuf> = files(folder.path())
+            .into_iter()
+            .filter(|file| !file.starts_with(&inside))
+            .collect();
+        assert_eq!(before, after);
     }
-    let after: Vec<PathBuf> = files(folder.path())
-        .into_iter()
-        .filter(|file| !file.starts_with(&inside))
-        .collect();
-    assert_eq!(before, after);
 }
 
 /// A campaign of one run, with the program `launcher`, or the reference skills if it is empty.
@@ -647,7 +657,7 @@ fn too_many_open_files_are_not_damage() {
         (0..20).for_each(|index| history.commit(&sample_run("k", index)).unwrap());
     }
     let mut seen = 0;
-    for limit in [12, 16, 20, 24, 32, 48, 64, 96] {
+    for limit in [4, 5, 6, 7, 8, 9, 10, 12, 16, 20, 24, 32, 48, 64, 96] {
         for command in [
             "list --history h",
             "analyse --history h",

@@ -2,32 +2,38 @@
 //! refused or read, quickly and without a panic.
 
 use std::path::{Path, PathBuf};
+use std::slice::from_ref;
 
 use actcheck::analysis::Mirror;
 use actcheck::base::{Diagnostics, Digest};
-use actcheck::history::{CampaignRecord, History, RunFilter};
+use actcheck::history::{CampaignRecord, History, NewestJudgements, Recheck, RunFilter, RunRecord};
 
-/// The files: summaries, seals, journals, traces, and tables with the list of them.
-pub const PLACES: [&str; 8] = [
-    "seal/SUMS",
-    "journal",
-    "outlines/k.000000000-000000005.outlines",
-    "outlines/k-1.outline",
-    "traces/k-1.trace",
+use super::frames;
+
+/// The files: those of a campaign, and tables with the list of them.
+pub const PLACES: [&str; 9] = [
+    "campaigns/k/campaign",
+    RUNS,
+    "campaigns/k/0001.details",
+    "campaigns/k/0001.states",
+    "campaigns/k/0001.motion",
+    "campaigns/k/0002.judgements",
     "tables/FILES",
     "tables/RECHECKED",
     "tables/parquet",
 ];
-/// Size of a record's header in a journal, and of the table in a file of outlines after its magic
-/// bytes. Unit: bytes.
-const RECORD: usize = 16;
-const OUTLINES: usize = 8 + 4 * 8 + 4;
+/// The file whose frames have the places of those in other columns.
+const RUNS: &str = "campaigns/k/0001.runs";
+/// The ways in which a file is written: with right checksums, as it is, and so that other frames fit:
+/// runs have the places of its frames, and the copies of a campaign are equal.
+pub const WAYS: usize = 3;
 
-/// A history with an empty campaign, in a folder that must not exist.
+/// A history with runs of the campaign `k`, in a folder that must not exist: every second one is
+/// kept as outcomes. One judgement was made later.
 ///
 /// # Panics
-/// The folder can't be written.
-pub fn made(folder: &Path) {
+/// The folder can't be written, or there is no run.
+pub fn made(folder: &Path, runs: &[RunRecord]) {
     let history = History::open(folder).expect("the folder can be written");
     let record = CampaignRecord {
         id: "k".to_owned(),
@@ -56,17 +62,47 @@ pub fn made(folder: &Path) {
     history
         .begin_campaign(&record)
         .expect("the folder can be written");
-    drop(history);
-    for name in ["outlines", "tables"] {
-        std::fs::create_dir_all(folder.join(name)).expect("the folder can be written");
+    for (number, run) in runs.iter().enumerate() {
+        let stored = if number % 2 == 0 {
+            history.commit(run)
+        } else {
+            history.commit_outcomes(run)
+        };
+        stored.expect("the folder can be written");
     }
-    let version = "actcheck history 4\n";
-    std::fs::write(folder.join("VERSION"), version).expect("the folder can be written");
+    drop(history);
+    // Another process writes a segment of its own.
+    let history = History::open(folder).expect("the folder can be written");
+    judge_again(&history, runs.first().expect("there are runs"));
+    drop(history);
+    std::fs::create_dir_all(folder.join("tables")).expect("the folder can be written");
 }
 
-/// Writes a file of a history, asks for everything that is read from it, and removes it. The first
-/// byte of the data chooses the place, and whether checksums are corrected, so that the bytes
-/// behind them are reached.
+/// Stores another outcome of a run's first property.
+fn judge_again(history: &History, run: &RunRecord) {
+    let property = run.judgements[0][0].property.clone();
+    let before = NewestJudgements::of(history)
+        .read(&run.id, 1, from_ref(&property))
+        .expect("it was just written")
+        .remove(0);
+    let mut now = before.judgement.clone();
+    now.witness.push_str(", later");
+    now.rule_digest.push('2');
+    let recheck = Recheck {
+        run: run.id.clone(),
+        step: 1,
+        action: run.actions[0].clone(),
+        before: Some(before),
+        now,
+    };
+    history
+        .commit_rechecks(&[recheck], "2026-08-02T12:00:00Z")
+        .and_then(|()| history.finish_rechecks())
+        .expect("the folder can be written");
+}
+
+/// Writes a file of a history, asks for everything that is read from it, and restores it. The first
+/// byte of the data chooses the place, and the way: see [`WAYS`].
 ///
 /// # Panics
 /// The folder can't be written, or the library panics.
@@ -74,15 +110,38 @@ pub fn history(folder: &Path, data: &[u8]) -> Result<(), Diagnostics> {
     let Some((first, content)) = data.split_first() else {
         return Ok(());
     };
-    let place = usize::from(*first) % PLACES.len();
-    let mut bytes = content.to_vec();
-    if (usize::from(*first) / PLACES.len()).is_multiple_of(2) {
-        correct(PLACES[place], &mut bytes);
+    let (place, way) = (
+        PLACES[usize::from(*first) % PLACES.len()],
+        usize::from(*first) / PLACES.len() % WAYS,
+    );
+    let is_column = place.starts_with("campaigns");
+    let mut contents = frames::contents(content);
+    if way == 2 && place == PLACES[0] {
+        // The two copies of a campaign are equal.
+        contents = vec![contents.first().copied().unwrap_or_default(); 2];
     }
-    let file = path(folder, PLACES[place], &bytes);
+    let bytes = if is_column && way != 1 {
+        frames::file(content, &contents)
+    } else {
+        content.to_vec()
+    };
+    let file = path(folder, place, &bytes);
+    let before = std::fs::read(&file).ok();
+    let runs = folder.join(RUNS);
+    let runs_before = std::fs::read(&runs).expect("the history has runs");
+    if way == 2 && is_column && place != RUNS {
+        let old = before.as_deref().unwrap_or_default();
+        let repointed = frames::repointed(&runs_before, old, &bytes);
+        std::fs::write(&runs, repointed).expect("the folder can be written");
+    }
     std::fs::write(&file, bytes).expect("the folder can be written");
     let asked = ask(folder);
-    let _ = std::fs::remove_file(file);
+    let _ = std::fs::remove_dir_all(folder.join("tables"));
+    std::fs::create_dir_all(folder.join("tables")).expect("the folder can be written");
+    if let Some(before) = before {
+        std::fs::write(&file, before).expect("the folder can be written");
+    }
+    std::fs::write(&runs, runs_before).expect("the folder can be written");
     asked
 }
 
@@ -97,67 +156,29 @@ fn path(folder: &Path, place: &str, bytes: &[u8]) -> PathBuf {
 
 fn ask(folder: &Path) -> Result<(), Diagnostics> {
     let _ = History::examine(folder);
+    let _ = History::count_runs(folder);
+    if let Ok((salvaged, _)) = History::open_to_salvage(folder) {
+        let _ = read(&salvaged);
+    }
     let history = History::open_to_read(folder)?;
-    let _ = history.journal_warning();
+    let _ = history.tail_warning();
     let _ = Mirror::damage(&history);
     let _ = Mirror::update(&history);
+    read(&history)
+}
+
+/// Reads all that a history has.
+fn read(history: &History) -> Result<(), Diagnostics> {
+    let _ = history.query("SELECT ?p (COUNT(*) AS ?n) WHERE { ?s ?p ?o } GROUP BY ?p");
+    let _ = history.query("SELECT (COUNT(*) AS ?n) WHERE { GRAPH ?g { ?s ?p ?o } }");
+    let _ = history.campaign("k");
+    let _ = history.newest_outcomes(&RunFilter::default());
     for run in history.runs(&RunFilter::default())? {
         let _ = history.run(&run.run);
+        let _ = history.newest_run(&run.run);
+        let _ = history.choices(&run.run);
+        let _ = history.recorded(&run.run);
         let _ = history.trace(&run.run);
     }
-    let _ = history.query("SELECT ?p (COUNT(*) AS ?n) WHERE { ?s ?p ?o } GROUP BY ?p");
     Ok(())
-}
-
-/// Makes the checksums of a file fit its content.
-fn correct(place: &str, bytes: &mut Vec<u8>) {
-    let word = |bytes: &[u8], at: usize| {
-        u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
-    };
-    match place {
-        "seal/SUMS" => {
-            let sum = crc(bytes);
-            bytes.extend(format!("{sum:08x}\n").into_bytes());
-        }
-        "journal" => {
-            let mut at = 0;
-            while at + RECORD <= bytes.len() {
-                let rest = bytes.len() - at - RECORD;
-                let size = (word(bytes, at) as usize).min(rest);
-                bytes[at..at + 4].copy_from_slice(&(size as u32).to_le_bytes());
-                let sum = crc(&bytes[at + RECORD..at + RECORD + size]);
-                bytes[at + 8..at + 12].copy_from_slice(&sum.to_le_bytes());
-                let header = crc(&bytes[at..at + 12]);
-                bytes[at + 12..at + 16].copy_from_slice(&header.to_le_bytes());
-                at += RECORD + size;
-            }
-        }
-        _ if place.starts_with("outlines") && bytes.len() >= OUTLINES => {
-            let mut from = OUTLINES;
-            for part in 0..4 {
-                let at = 8 + 8 * part;
-                let size = (word(bytes, at) as usize).min(bytes.len() - from);
-                let sum = crc(&bytes[from..from + size]);
-                bytes[at..at + 4].copy_from_slice(&(size as u32).to_le_bytes());
-                bytes[at + 4..at + 8].copy_from_slice(&sum.to_le_bytes());
-                from += size;
-            }
-            let sum = crc(&bytes[..OUTLINES - 4]);
-            bytes[OUTLINES - 4..OUTLINES].copy_from_slice(&sum.to_le_bytes());
-        }
-        _ => {}
-    }
-}
-
-/// The checksum CRC-32.
-fn crc(bytes: &[u8]) -> u32 {
-    !bytes.iter().fold(!0_u32, |sum, byte| {
-        (0..8).fold(sum ^ u32::from(*byte), |sum, _| {
-            if sum & 1 == 1 {
-                (sum >> 1) ^ 0xedb8_8320
-            } else {
-                sum >> 1
-            }
-        })
-    })
 }

@@ -5,6 +5,7 @@
 //! `tests/fuzz_corpus.rs` of the program includes this file and gives them the corpus as a
 //! regression test.
 
+pub mod frames;
 pub mod histories;
 pub mod imports;
 

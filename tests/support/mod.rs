@@ -3,6 +3,7 @@
 pub mod checkout;
 pub mod chromium;
 pub mod expected;
+pub mod exported;
 pub mod foreign;
 pub mod line;
 pub mod look;
@@ -16,7 +17,6 @@ pub mod triple_store;
 pub mod urdf;
 
 use std::collections::BTreeMap;
-use std::io::ErrorKind;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -108,55 +108,22 @@ pub fn shipped_project() -> tempfile::TempDir {
     folder
 }
 
-/// Copies a folder without histories.
+/// Copies a folder without histories in it. An open history has the same content as one whose owner
+/// was killed.
 pub fn copy(from: &Path, to: &Path) {
-    try_copy(from, to).unwrap();
-}
-
-/// Copies the folder of a history that is open. Its owner may still write and remove files in the
-/// background: then the copy may be of two times, so the folder is copied once more.
-pub fn copy_open(from: &Path, to: &Path) {
-    loop {
-        let before = sizes(from);
-        let copied = try_copy(from, to);
-        if let Err(error) = &copied {
-            assert_eq!(error.kind(), ErrorKind::NotFound, "{error}");
-        }
-        if copied.is_ok() && sizes(from) == before {
-            return;
-        }
-        std::fs::remove_dir_all(to).unwrap();
-    }
-}
-
-/// All files in a folder with their sizes, in bytes; files removed meanwhile have none.
-fn sizes(folder: &Path) -> BTreeMap<PathBuf, Option<u64>> {
-    let entries = std::fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path());
-    entries
-        .flat_map(|path| match path.metadata() {
-            Ok(metadata) if metadata.is_dir() => sizes(&path),
-            size => BTreeMap::from([(path, size.ok().map(|metadata| metadata.len()))]),
-        })
-        .collect()
-}
-
-fn try_copy(from: &Path, to: &Path) -> std::io::Result<()> {
-    std::fs::create_dir_all(to)?;
-    for entry in std::fs::read_dir(from)? {
-        let entry = entry?;
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
         let target: PathBuf = to.join(entry.file_name());
         if entry.file_name() == ".actcheck" {
             continue;
         }
         if entry.path().is_dir() {
-            try_copy(&entry.path(), &target)?;
+            copy(&entry.path(), &target);
         } else {
-            std::fs::copy(entry.path(), target)?;
+            std::fs::copy(entry.path(), target).unwrap();
         }
     }
-    Ok(())
 }
 
 /// Writes an executable file.

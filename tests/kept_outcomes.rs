@@ -1,4 +1,4 @@
-//! Runs that are kept as outlines: every command answers as if they were kept whole, and their
+//! Runs that are kept as outcomes: every command answers as if they were kept whole, and their
 //! motion comes back bit for bit.
 
 use std::collections::BTreeSet;
@@ -7,13 +7,14 @@ use std::path::{Path, PathBuf};
 use actcheck::history::{CampaignEnd, History, RunFilter, RunRecord};
 use tempfile::TempDir;
 
+use crate::fuzz_corpus::entrances::frames;
 use crate::history::{sample_campaign, sample_run};
-use crate::support::{actcheck, copy, copy_open, edit, project, stderr, stdout};
+use crate::support::exported::{Exported, statements};
+use crate::support::{actcheck, copy, edit, project, stderr, stdout};
 
-/// A file of many runs, and some single ones.
 const RUNS: u64 = 140;
 
-/// Two histories with the same runs: kept whole, and as outlines. `ended`: whether the campaign has
+/// Two histories with the same runs: kept whole, and as outcomes. `ended`: whether the campaign has
 /// its end.
 fn both(folder: &Path, ended: bool) -> [PathBuf; 2] {
     let make = |name: &str, commit: &dyn Fn(&History, &RunRecord)| {
@@ -37,21 +38,10 @@ fn both(folder: &Path, ended: bool) -> [PathBuf; 2] {
     };
     [
         make("whole", &|history, run| history.commit(run).unwrap()),
-        make("outlines", &|history, run| {
-            history.commit_outline(run).unwrap()
+        make("outcomes", &|history, run| {
+            history.commit_outcomes(run).unwrap()
         }),
     ]
-}
-
-fn statements(history: &History) -> BTreeSet<String> {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("all.nq");
-    history.write_nquads(&file).unwrap();
-    std::fs::read_to_string(file)
-        .unwrap()
-        .lines()
-        .map(str::to_owned)
-        .collect()
 }
 
 fn vitals(history: &History) -> Vec<String> {
@@ -62,43 +52,43 @@ fn vitals(history: &History) -> Vec<String> {
     all
 }
 
-fn assert_equal(whole: &History, outlines: &History) {
+fn assert_equal(whole: &History, outcomes: &History) {
     let all = RunFilter::default();
     let rows = whole.runs(&all).unwrap();
     assert_eq!(rows.len(), RUNS as usize);
-    assert_eq!(outlines.runs(&all).unwrap(), rows);
-    assert_eq!(outlines.campaigns().unwrap(), whole.campaigns().unwrap());
-    assert_eq!(outlines.run_ids().unwrap(), whole.run_ids().unwrap());
+    assert_eq!(outcomes.runs(&all).unwrap(), rows);
+    assert_eq!(outcomes.campaigns().unwrap(), whole.campaigns().unwrap());
+    assert_eq!(outcomes.run_ids().unwrap(), whole.run_ids().unwrap());
     assert_eq!(
-        outlines.outcomes(&all).unwrap(),
+        outcomes.outcomes(&all).unwrap(),
         whole.outcomes(&all).unwrap()
     );
     assert_eq!(
-        outlines.newest_outcomes(&all).unwrap(),
+        outcomes.newest_outcomes(&all).unwrap(),
         whole.newest_outcomes(&all).unwrap()
     );
     assert_eq!(
-        outlines.counted_runs().unwrap(),
+        outcomes.counted_runs().unwrap(),
         whole.counted_runs().unwrap()
     );
     assert_eq!(
-        outlines.scenes(&rows).unwrap(),
+        outcomes.scenes(&rows).unwrap(),
         whole.scenes(&rows).unwrap()
     );
-    assert_eq!(vitals(outlines), vitals(whole));
+    assert_eq!(vitals(outcomes), vitals(whole));
     for run in ["k-1", "k-128", "k-129", "k-140", "@last", "@last-failed"] {
         assert_eq!(
-            outlines.newest_run(run).unwrap(),
+            outcomes.newest_run(run).unwrap(),
             whole.newest_run(run).unwrap(),
             "{run}"
         );
         assert_eq!(
-            outlines.recorded(run).unwrap(),
+            outcomes.recorded(run).unwrap(),
             whole.recorded(run).unwrap(),
             "{run}"
         );
         assert_eq!(
-            outlines.choices(run).unwrap(),
+            outcomes.choices(run).unwrap(),
             whole.choices(run).unwrap(),
             "{run}"
         );
@@ -113,45 +103,53 @@ fn assert_equal(whole: &History, outlines: &History) {
                 .unwrap()
                 .code
         };
-        assert_eq!((of(outlines), of(whole)), ("H008", "H008"));
+        assert_eq!((of(outcomes), of(whole)), ("H008", "H008"));
     }
 }
 
+/// The names of the files of a folder, sorted.
+fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> = entries
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
 #[test]
-fn outlines_answer_as_whole_runs_do() {
+fn runs_kept_as_outcomes_answer_as_whole_runs_do() {
     for ended in [false, true] {
         let folder = tempfile::tempdir().unwrap();
-        let [whole, outlines] = both(folder.path(), ended);
+        let [whole, outcomes] = both(folder.path(), ended);
         assert_eq!(
-            std::fs::read_to_string(outlines.join("VERSION")).unwrap(),
-            "actcheck history 4\n"
+            std::fs::read_to_string(outcomes.join("VERSION")).unwrap(),
+            "actcheck history 5\n"
         );
-        let files = std::fs::read_dir(outlines.join("outlines"))
-            .unwrap()
-            .count();
-        assert_eq!(files, if ended { 2 } else { 1 + (RUNS as usize - 128) });
+        assert!(whole.join("campaigns/k/0001.motion").exists());
         assert_eq!(
-            std::fs::read_dir(outlines.join("traces")).unwrap().count(),
-            0
+            names(&outcomes.join("campaigns/k")),
+            ["0001.details", "0001.runs", "0001.states", "campaign"]
         );
         // Readers, and owners.
         assert_equal(
             &History::open_to_read(&whole).unwrap(),
-            &History::open_to_read(&outlines).unwrap(),
+            &History::open_to_read(&outcomes).unwrap(),
         );
-        let [whole, outlines] = [whole, outlines].map(|dir| History::open_existing(&dir).unwrap());
-        assert_equal(&whole, &outlines);
-        assert_eq!(statements(&outlines), statements(&whole));
-        let fault = outlines.trace("k-1").unwrap_err();
+        let [whole, outcomes] = [whole, outcomes].map(|dir| History::open_existing(&dir).unwrap());
+        assert_equal(&whole, &outcomes);
+        assert_eq!(statements(&outcomes), statements(&whole));
+        let fault = outcomes.trace("k-1").unwrap_err();
         assert_eq!(fault.iter().next().unwrap().code, "H031");
     }
 }
 
 #[test]
-fn queries_see_outlines_and_their_facts() {
+fn queries_see_kept_outcomes_and_their_facts() {
     let folder = tempfile::tempdir().unwrap();
-    let [whole, outlines] =
+    let [whole, outcomes] =
         both(folder.path(), true).map(|dir| History::open_to_read(&dir).unwrap());
+    let exported = Exported::of(&outcomes);
     for query in [
         "SELECT ?run ?score { ?run a act:Run ; act:score ?score } ORDER BY ?run",
         "SELECT ?p ?o (COUNT(*) AS ?n) { ?a earl:test ?p ; earl:result/act:outcome ?o } GROUP BY ?p ?o ORDER BY ?p ?o",
@@ -161,24 +159,29 @@ fn queries_see_outlines_and_their_facts() {
         "ASK { <https://w3id.org/actcheck/run/k-120> act:score ?s }",
     ] {
         let answers =
-            [&outlines, &whole].map(|history| format!("{:?}", history.query(query).unwrap()));
+            [&outcomes, &whole].map(|history| format!("{:?}", history.query(query).unwrap()));
         assert_eq!(answers[0], answers[1], "{query}");
+        assert_eq!(
+            answers[0],
+            format!("{:?}", exported.query(query)),
+            "{query}"
+        );
     }
-    // Statements that queries loaded are not counted twice.
+    // Statements that queries made are not counted twice.
     assert_eq!(
-        outlines.runs(&RunFilter::default()).unwrap().len(),
+        outcomes.runs(&RunFilter::default()).unwrap().len(),
         RUNS as usize
     );
 }
 
-/// A history of outlines in the state in which a killed process left it.
+/// A history of runs kept as outcomes in the state in which a killed process left it.
 fn killed(runs: u64) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let (live, left) = (folder.path().join("live"), folder.path().join("left"));
     let history = History::open(&live).unwrap();
     history.begin_campaign(&sample_campaign("k", 0)).unwrap();
-    (0..runs).for_each(|index| history.commit_outline(&sample_run("k", index)).unwrap());
-    copy_open(&live, &left);
+    (0..runs).for_each(|index| history.commit_outcomes(&sample_run("k", index)).unwrap());
+    copy(&live, &left);
     (folder, left)
 }
 
@@ -193,59 +196,64 @@ fn ids(dir: &Path) -> Vec<String> {
 }
 
 #[test]
-fn a_kill_at_any_moment_loses_no_outline_and_has_none_twice() {
+fn a_kill_at_any_moment_loses_no_outcome_and_has_none_twice() {
     for runs in [1, 127, 130] {
         let (_folder, left) = killed(runs);
         let wanted: Vec<String> = (1..=runs).map(|number| format!("k-{number}")).collect();
         assert_eq!(ids(&left), wanted);
-        // It was killed while it put files together: after it wrote the large one, and removed some
-        // of the single ones.
-        let shelf = left.join("outlines");
-        let singles = |shelf: &Path| -> Vec<PathBuf> {
-            let files = std::fs::read_dir(shelf)
-                .unwrap()
-                .map(|entry| entry.unwrap().path());
-            files
-                .filter(|file| file.extension().is_some_and(|ending| ending == "outline"))
-                .collect()
-        };
-        let before = tempfile::tempdir().unwrap();
-        copy(&shelf, before.path());
-        std::fs::write(shelf.join("k-9.outline.1-1.tmp"), "half").unwrap();
+        // It was killed while it wrote another run: its states are complete, its details half.
+        let campaign = left.join("campaigns/k");
+        for (extension, is_half) in [("states", false), ("details", true)] {
+            let file = campaign.join("0001").with_extension(extension);
+            let whole = std::fs::read(&file).unwrap();
+            let mut contents = frames::contents(&whole);
+            contents.push(contents[contents.len() - 1]);
+            let mut written = frames::file(&whole, &contents);
+            let added = written.len() - whole.len();
+            written.truncate(written.len() - if is_half { added / 2 } else { 0 });
+            std::fs::write(&file, written).unwrap();
+        }
+        assert_eq!(ids(&left), wanted);
+        // So was the next process, in a segment of its own.
+        let history = History::open_existing(&left).unwrap();
+        history.commit_outcomes(&sample_run("k", runs)).unwrap();
+        drop(history);
+        assert_eq!(ids(&left).len() as u64, runs + 1);
+        let runs_file = campaign.join("0002.runs");
+        let whole = std::fs::read(&runs_file).unwrap();
+        std::fs::write(&runs_file, &whole[..whole.len() - 1]).unwrap();
+        assert_eq!(ids(&left), wanted);
+        let history = History::open_existing(&left).unwrap();
+        history.commit_outcomes(&sample_run("k", runs)).unwrap();
         let end = CampaignEnd {
             ended: "2026-08-01T13:00:00Z".to_owned(),
             ..CampaignEnd::default()
         };
-        History::open_existing(&left)
-            .unwrap()
-            .finish_campaign("k", &end)
-            .unwrap();
-        assert!(singles(&shelf).is_empty());
-        for file in singles(before.path()).iter().step_by(2) {
-            std::fs::copy(file, shelf.join(file.file_name().unwrap())).unwrap();
-        }
-        assert_eq!(ids(&left), wanted);
+        history.finish_campaign("k", &end).unwrap();
+        drop(history);
+        // A campaign that is continued.
         let history = History::open_existing(&left).unwrap();
         history.reopen_campaign("k").unwrap();
-        assert!(!shelf.join("k-9.outline.1-1.tmp").exists());
-        history.commit_outline(&sample_run("k", runs)).unwrap();
+        history.commit_outcomes(&sample_run("k", runs + 1)).unwrap();
         history.finish_campaign("k", &end).unwrap();
-        assert!(singles(&shelf).is_empty());
         drop(history);
-        assert_eq!(ids(&left).len() as u64, runs + 1);
-        assert_eq!(
-            History::open_to_read(&left).unwrap().campaigns().unwrap()[0].runs,
-            runs + 1
-        );
+        let (found, history) = History::examine(&left).unwrap();
+        assert_eq!((found.damage, found.runs as u64), (Vec::new(), runs + 2));
+        assert!(history.tail_warning().unwrap().is_none());
+        let row = &history.campaigns().unwrap()[0];
+        assert_eq!((row.runs, row.interrupted), (runs + 2, false));
+        let again: Vec<String> = (1..=runs + 2).map(|number| format!("k-{number}")).collect();
+        assert_eq!(ids(&left), again);
+        assert_eq!(History::count_runs(&left), runs + 2);
     }
 }
 
 #[test]
-fn every_damaged_file_of_outlines_is_named() {
+fn every_damaged_column_of_outcomes_is_named() {
     let (_folder, left) = killed(130);
-    let shelf = left.join("outlines");
-    for name in ["k.000000000-000000127.outlines", "k-130.outline"] {
-        let file = shelf.join(name);
+    for extension in ["runs", "details", "states"] {
+        let name = Path::new("campaigns/k/0001").with_extension(extension);
+        let file = left.join(&name);
         let whole = std::fs::read(&file).unwrap();
         for at in (0..whole.len())
             .step_by(whole.len() / 60 + 1)
@@ -255,33 +263,41 @@ fn every_damaged_file_of_outlines_is_named() {
             bytes[at] ^= 4;
             std::fs::write(&file, &bytes).unwrap();
             let (found, history) = History::examine(&left).unwrap();
-            let named: Vec<&Path> = found
+            let named: BTreeSet<&Path> = found
                 .damage
                 .iter()
                 .map(|damage| damage.file.as_path())
                 .collect();
-            assert_eq!(named, [Path::new("outlines").join(name)], "byte {at}");
+            assert_eq!(
+                named,
+                BTreeSet::from([name.as_path()]),
+                "byte {at} of {}",
+                name.display()
+            );
             // Reading either does not need the damaged part, or reports it.
-            let read = || {
-                history
-                    .runs(&RunFilter::default())
-                    .and_then(|_| history.recorded("k-1"))
-            };
-            if let Err(faults) = read() {
-                assert!(
-                    faults
-                        .iter()
-                        .all(|fault| fault.code == "H007" || fault.code == "H008"),
-                    "{faults}"
-                );
+            for run in [1, 70, 130] {
+                let read = || {
+                    history
+                        .runs(&RunFilter::default())
+                        .and_then(|_| history.recorded(&format!("k-{run}")))
+                };
+                if let Err(faults) = read() {
+                    assert!(
+                        faults
+                            .iter()
+                            .all(|fault| fault.code == "H007" || fault.code == "H008"),
+                        "{faults}"
+                    );
+                }
             }
         }
+        // A file that has lost more than the run that a killed process was writing.
         for length in [0, 7, 43, 44, whole.len() / 2] {
             std::fs::write(&file, &whole[..length]).unwrap();
-            assert_eq!(
-                History::examine(&left).unwrap().0.damage.len(),
-                1,
-                "{length}"
+            let (found, _) = History::examine(&left).unwrap();
+            assert!(
+                found.damage.iter().any(|damage| damage.file == name),
+                "{length}: {found:?}"
             );
         }
         std::fs::write(&file, &whole).unwrap();
@@ -320,10 +336,10 @@ fn without_ids(text: &str) -> Vec<String> {
 }
 
 #[test]
-fn the_motion_of_outlines_comes_back_bit_for_bit() {
+fn the_motion_of_kept_outcomes_comes_back_bit_for_bit() {
     let project = project();
     let folder = project.path();
-    keep(folder, "outlines", "keep = \"outcomes\"");
+    keep(folder, "outcomes", "keep = \"outcomes\"");
     keep(folder, "some", "keep = \"failures\"\nkeep_whole = 0.3");
     let run = |name: &str| {
         printed(
@@ -339,29 +355,29 @@ fn the_motion_of_outlines_comes_back_bit_for_bit() {
             name,
         )
     };
-    for name in ["pick", "outlines", "some"] {
+    for name in ["pick", "outcomes", "some"] {
         run(name);
     }
     let listed = |name: &str| without_ids(&printed(folder, &["list", "--format", "csv"], name));
-    assert_eq!(listed("outlines"), listed("pick"));
+    assert_eq!(listed("outcomes"), listed("pick"));
     assert_eq!(listed("some"), listed("pick"));
-    let [whole, outlines, some] =
-        ["pick", "outlines", "some"].map(|name| History::open_to_read(&folder.join(name)).unwrap());
+    let [whole, outcomes, some] =
+        ["pick", "outcomes", "some"].map(|name| History::open_to_read(&folder.join(name)).unwrap());
     let rows = |history: &History| history.runs(&RunFilter::default()).unwrap();
-    let is_outline = |history: &History| -> Vec<bool> {
+    let is_whole = |history: &History| -> Vec<bool> {
         rows(history)
             .iter()
-            .map(|row| history.is_outline(&row.run).unwrap())
+            .map(|row| history.is_whole(&row.run).unwrap())
             .collect()
     };
-    assert_eq!(is_outline(&whole), [false; 6]);
-    assert_eq!(is_outline(&outlines), [true; 6]);
-    let kept = is_outline(&some);
+    assert_eq!(is_whole(&whole), [true; 6]);
+    assert_eq!(is_whole(&outcomes), [false; 6]);
+    let kept = is_whole(&some);
     assert!(kept.contains(&true) && kept.contains(&false), "{kept:?}");
-    for (row, is_outline) in rows(&some).iter().zip(kept) {
-        assert!(!is_outline || row.score == 1.0, "{row:?}");
+    for (row, is_whole) in rows(&some).iter().zip(kept) {
+        assert!(is_whole || row.score == 1.0, "{row:?}");
     }
-    // Quantities over time are not in outlines, so all runs are simulated again.
+    // Quantities over time are not kept with outcomes, so all runs are simulated again.
     let recheck = [
         "recheck",
         "HeldWhileLifted",
@@ -371,7 +387,7 @@ fn the_motion_of_outlines_comes_back_bit_for_bit() {
         "csv",
     ];
     let rechecked = |name: &str| without_ids(&printed(folder, &recheck, name));
-    assert_eq!(rechecked("outlines"), rechecked("pick"));
+    assert_eq!(rechecked("outcomes"), rechecked("pick"));
     let judged = |name: &str| {
         let history = History::open_to_read(&folder.join(name)).unwrap();
         let rows = history.newest_outcomes(&RunFilter::default()).unwrap().rows;
@@ -386,8 +402,8 @@ fn the_motion_of_outlines_comes_back_bit_for_bit() {
             })
             .collect::<Vec<_>>()
     };
-    assert_eq!(judged("outlines"), judged("pick"));
-    let replayed = printed(folder, &["replay", "@last"], "outlines");
+    assert_eq!(judged("outcomes"), judged("pick"));
+    let replayed = printed(folder, &["replay", "@last"], "outcomes");
     assert!(
         replayed.contains("the same, every bit of every state"),
         "{replayed}"
@@ -398,7 +414,7 @@ fn the_motion_of_outlines_comes_back_bit_for_bit() {
         "mass_kg = 0.",
         "mass_kg = 1.",
     );
-    let output = actcheck(folder, &[&recheck[..], &["--history", "outlines"]].concat());
+    let output = actcheck(folder, &[&recheck[..], &["--history", "outcomes"]].concat());
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("H031"), "{}", stderr(&output));
 }
