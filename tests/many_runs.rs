@@ -52,7 +52,8 @@ fn make(dir: &Path, shard: Option<Shard>) -> History {
             .iter()
             .map(|index| sample_run("k", *index))
             .collect();
-        history.commit_all_outcomes("k", &runs).unwrap();
+        runs.iter()
+            .for_each(|run| history.commit_outcomes(run).unwrap());
     }
     history.finish_campaign("k", &end()).unwrap();
     history
@@ -178,7 +179,8 @@ fn lists_of_many_runs_are_printed_in_parts() {
             .iter()
             .map(|index| sample_run("k", *index))
             .collect();
-        history.commit_all_outcomes("k", &runs).unwrap();
+        runs.iter()
+            .for_each(|run| history.commit_outcomes(run).unwrap());
     }
     history.finish_campaign("k", &end()).unwrap();
     drop(history);

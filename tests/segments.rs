@@ -597,7 +597,7 @@ fn a_run_takes_few_bytes() {
     let sum = |sizes: &BTreeMap<String, u64>| sizes.values().sum::<u64>();
     assert!(outcomes["runs"] < 400, "{outcomes:?}");
     assert!(sum(&outcomes) < 4_000, "{outcomes:?}");
-    assert!(sum(&whole) < 10_000, "{whole:?}");
+    assert!(sum(&whole) < 12_000, "{whole:?}");
     assert!(!outcomes.contains_key("motion") && outcomes["states"] == whole["states"]);
 }
 

@@ -218,7 +218,7 @@ pub fn stored(history: &History, env: &Env, id: &str) -> Result<Vec<RunDetail>, 
         campaign: Some(id.to_owned()),
         ..RunFilter::default()
     })?;
-    let mut ids: Vec<String> = rows.into_iter().map(|row| row.run).collect();
+    let ids: Vec<String> = rows.into_iter().map(|row| row.run).collect();
     let mut kept: Vec<RunDetail> = ids
         .iter()
         .map(|run| history.run(run))

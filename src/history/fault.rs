@@ -85,6 +85,7 @@ pub(super) fn io(dir: &Path, doing: &str, error: &std::io::Error) -> Diagnostics
 /// H007: a file of a segment or of a campaign is damaged; or it can't be read.
 pub(super) fn segment(folder: &Folder, file: &Path, fault: &ReadFault) -> Diagnostics {
     match fault {
+        ReadFault::Io(error) if error.kind() == ErrorKind::NotFound => missing(folder, file),
         ReadFault::Io(error) => io(folder.dir(), &format!("reading `{}`", file.display()), error),
         ReadFault::Damaged(fault) => {
             let file = folder.relative(file).display();
@@ -109,7 +110,6 @@ pub(super) fn run(
 ) -> Diagnostics {
     let file = run.segment.file(column);
     match fault {
-        ReadFault::Io(error) if error.kind() == ErrorKind::NotFound => missing(folder, id, &file),
         ReadFault::Io(_) => segment(folder, &file, fault),
         ReadFault::Damaged(fault) => {
             let file = folder.relative(&file).display();
@@ -132,8 +132,8 @@ pub(super) fn undecodable(
 }
 
 /// H009: a file of a segment is missing.
-fn missing(folder: &Folder, id: &str, file: &Path) -> Diagnostics {
-    let message = format!("values of run {id} can't be read: `{}` is missing", file.display());
+fn missing(folder: &Folder, file: &Path) -> Diagnostics {
+    let message = format!("values of runs can't be read: `{}` is missing", file.display());
     Diagnostic::error("H009", message)
         .help(format!(
             "restore the file from a backup; the other files of the history `{}` are intact",

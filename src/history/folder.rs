@@ -161,16 +161,20 @@ impl Folder {
         let mut campaigns = BTreeMap::new();
         for (name, kind) in entries {
             let path = folder.join(&name);
-            if kind != FileKind::Folder {
-                return Err(fault::not_plain(&self.dir, &path, kind));
+            match kind {
+                FileKind::Folder => {}
+                // It is none of this program.
+                FileKind::File => continue,
+                _ => return Err(fault::not_plain(&self.dir, &path, kind)),
             }
             let id = name.to_string_lossy().into_owned();
+            let Some(extent) = self.campaign_extent(&id)? else {
+                continue;
+            };
             if !names::is_id(&id) {
                 return Err(fault::foreign_id(&self.dir, "campaign", &id));
             }
-            if let Some(extent) = self.campaign_extent(&id)? {
-                campaigns.insert(id, extent);
-            }
+            campaigns.insert(id, extent);
         }
         Ok(FolderExtent { campaigns })
     }

@@ -124,7 +124,7 @@ fn term(term: &StoreTerm) -> Term {
     }
     match literal.datatype() {
         xsd::STRING => Term::string(text),
-        xsd::INTEGER => Term::Integer(text.parse().unwrap()),
+        xsd::INTEGER if text.parse::<i64>().is_ok() => Term::Integer(text.parse().unwrap()),
         xsd::DECIMAL => Term::Decimal(text.into()),
         xsd::DOUBLE => Term::Double(text.parse().unwrap()),
         xsd::BOOLEAN => Term::Boolean(text == "true"),

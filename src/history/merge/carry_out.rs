@@ -10,7 +10,7 @@ use crate::history::{place_of, run_id};
 use crate::merge::plan::{MergePlan, PlannedEnd, PlannedMerge};
 use crate::merge::survey::identity;
 use crate::segment::{
-    LaterJudgement, ReadFault, RunContent, Segment, SegmentColumn, copy_column,
+    LaterJudgement, RunContent, Segment, SegmentColumn, copy_column,
 };
 use crate::{FAILED_AGAIN, History, fault};
 use actcheck_base::Diagnostics;
@@ -200,23 +200,25 @@ impl Writer<'_> {
         let (from, to) = (history.folder.below(), self.into.folder.below());
         let folder = self.into.folder.campaign(&campaign.id);
         let number = self.into.next_segment(&campaign.id)?;
+        let unwritten = |error| fault::io(self.into.dir(), "writing merged data", &error);
+        let mut files = Vec::new();
         for column in SegmentColumn::OF_RUNS {
             let Some(end) = segment.end_of(column) else {
                 continue;
             };
-            let (old, new) = (
-                segment.file(column),
-                folder.join(format!("{number:04}.{}", column.extension())),
-            );
-            match copy_column(&from, &old, column, end, &to, &new) {
-                Ok(()) => {}
-                Err(ReadFault::Io(error)) => {
-                    return Err(fault::io(self.into.dir(), "writing merged data", &error));
-                }
-                Err(why @ ReadFault::Damaged(_)) => {
-                    return Err(fault::segment(&history.folder, &old, &why));
-                }
-            }
+            let old = segment.file(column);
+            let new = folder.join(format!("{number:04}.{}", column.extension()));
+            let new = to.new_file(&new).map_err(unwritten)?;
+            let writer = new.writer().map_err(unwritten)?;
+            copy_column(&from, &old, column, end, writer)
+                .map_err(|why| fault::segment(&history.folder, &old, &why))?
+                .map_err(unwritten)?;
+            files.push(new);
+        }
+        // The column of runs comes last. A kill while these were written would leave many runs
+        // without a row.
+        for file in files {
+            file.finish().map_err(unwritten)?;
         }
         Ok(true)
     }

@@ -185,17 +185,35 @@ impl ColumnReader {
     /// Opens a column of a segment.
     ///
     /// # Errors
-    /// The file is missing or can't be opened.
+    /// The file is missing, is one of another kind, or can't be opened.
     pub(crate) fn open(
         below: &Below,
         folder: &Path,
         number: u32,
         column: SegmentColumn,
-    ) -> io::Result<Self> {
-        Ok(Self {
-            file: below.open(&path(folder, number, column))?,
-            key: None,
-        })
+    ) -> Result<Self, ReadFault> {
+        let reader = Self::open_damaged(below, folder, number, column)?;
+        let mut head = [0; HEAD];
+        let has_head = reader.file.read_exact_at(&mut head, 0).is_ok() && head == column.head();
+        if has_head {
+            Ok(reader)
+        } else {
+            Err(FrameFault::Head.into())
+        }
+    }
+
+    /// As [`ColumnReader::open`], also if the first bytes are others.
+    ///
+    /// # Errors
+    /// The file is missing, or can't be opened.
+    pub(crate) fn open_damaged(
+        below: &Below,
+        folder: &Path,
+        number: u32,
+        column: SegmentColumn,
+    ) -> Result<Self, ReadFault> {
+        let file = below.open(&path(folder, number, column))?;
+        Ok(Self { file, key: None })
     }
 
     /// Expands the frame of a run.
@@ -239,7 +257,7 @@ impl ColumnReader {
     fn key_content(&self, offset: u64) -> Result<Vec<u8>, ReadFault> {
         let fault = || ReadFault::from(FrameFault::Content(offset));
         let mut head = [0; FRAME_HEADER];
-        self.file.read_exact_at(&mut head, offset)?;
+        self.file.read_exact_at(&mut head, offset).map_err(|error| cut(error, offset))?;
         let bytes = self.content(place_of(offset, head)?)?;
         let frame = PackedFrame::parse(&bytes).filter(|frame| frame.back == 0);
         let frame = frame.ok_or_else(fault)?;
@@ -249,16 +267,20 @@ impl ColumnReader {
     /// Reads the content of the frame at a place.
     fn content(&self, place: FramePlace) -> Result<Vec<u8>, ReadFault> {
         let mut bytes = vec![0; FRAME_HEADER + place.size as usize];
-        match self.file.read_exact_at(&mut bytes, place.offset) {
-            // The row is whole, so that the file has been cut.
-            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
-                return Err(FrameFault::Missing(place.offset).into());
-            }
-            read => read?,
-        }
+        let read = self.file.read_exact_at(&mut bytes, place.offset);
+        read.map_err(|error| cut(error, place.offset))?;
         content_of(place, &bytes)?;
         bytes.drain(..FRAME_HEADER);
         Ok(bytes)
+    }
+}
+
+/// The fault of a frame that can't be read: its row is whole, so that a file that ends before it has
+/// been cut.
+fn cut(error: io::Error, offset: u64) -> ReadFault {
+    match error.kind() {
+        io::ErrorKind::UnexpectedEof => FrameFault::Missing(offset).into(),
+        _ => error.into(),
     }
 }
 

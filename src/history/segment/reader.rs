@@ -1,11 +1,10 @@
 //! Reads a segment.
 
-use std::cell::RefCell;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::segment::frame::{
     FrameFault, FramePlace, Frames, HEAD, ReadFault, SegmentColumn, whole_frames,
@@ -19,9 +18,14 @@ use actcheck_base::Below;
 /// The key of the next segment.
 static KEYS: AtomicU64 = AtomicU64::new(0);
 
-thread_local! {
-    /// The columns that this thread has read last, each with the key of its segment.
-    static OPEN: RefCell<HashMap<SegmentColumn, (u64, ColumnReader)>> = RefCell::default();
+/// The columns that were read last, each with the key of its segment: most runs are read one after
+/// another.
+static OPEN: Mutex<Vec<(u64, SegmentColumn, ColumnReader)>> = Mutex::new(Vec::new());
+/// Number of columns that stay open.
+const MOST_OPEN: usize = 24;
+
+fn open_columns() -> MutexGuard<'static, Vec<(u64, SegmentColumn, ColumnReader)>> {
+    OPEN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// The runs of a segment at one moment. Another process may append further ones.
@@ -32,11 +36,20 @@ pub(crate) struct Segment {
     below: Below,
     /// Distinguishes it from all others of this process.
     key: u64,
+    /// Whether it is the readable part of a damaged one.
+    is_damaged: bool,
     texts: TextTable,
     rows: Vec<RunEntry>,
     /// Offset at which its whole rows end. Unit: bytes.
     end: u64,
     is_torn: bool,
+}
+
+impl Drop for Segment {
+    /// Closes its columns.
+    fn drop(&mut self) {
+        open_columns().retain(|(of, ..)| *of != self.key);
+    }
 }
 
 impl Segment {
@@ -63,6 +76,7 @@ impl Segment {
             number,
             below: below.clone(),
             key: KEYS.fetch_add(1, Ordering::Relaxed),
+            is_damaged: false,
             texts,
             rows,
             end: frames.tail().0,
@@ -92,6 +106,7 @@ impl Segment {
             number,
             below: below.clone(),
             key: KEYS.fetch_add(1, Ordering::Relaxed),
+            is_damaged: true,
             texts: TextTable::default(),
             rows: Vec::new(),
             end: 0,
@@ -106,7 +121,8 @@ impl Segment {
             .filter_map(|(_, content)| decode_row(content, &mut texts).ok());
         let mut lost: BTreeSet<u64> = rows.map(|row| row.index).collect();
         lost.extend(states.keys());
-        let mut reader = ColumnReader::open(below, folder, number, SegmentColumn::Details)?;
+        let column = SegmentColumn::Details;
+        let mut reader = ColumnReader::open_damaged(below, folder, number, column)?;
         for (index, place) in details {
             let Ok(stored) = decoded(&mut reader, index, place) else {
                 continue;
@@ -200,23 +216,35 @@ impl Segment {
         })
     }
 
-    /// Calls `read` with an open column. Each thread keeps the last one of each kind open, because
-    /// most runs are read one after another.
+    /// Calls `read` with an open column.
     fn with_column<T>(
         &self,
         column: SegmentColumn,
         read: impl FnOnce(&mut ColumnReader) -> Result<T, ReadFault>,
     ) -> Result<T, ReadFault> {
-        OPEN.with_borrow_mut(|open| {
-            let known = open.remove(&column).filter(|(of, _)| *of == self.key);
-            let mut reader = match known {
-                Some((_, reader)) => reader,
-                None => ColumnReader::open(&self.below, &self.folder, self.number, column)?,
-            };
-            let value = read(&mut reader)?;
-            open.insert(column, (self.key, reader));
-            Ok(value)
-        })
+        let known = {
+            let mut open = open_columns();
+            let place = open
+                .iter()
+                .position(|(of, kind, _)| *of == self.key && *kind == column);
+            place.map(|place| open.remove(place).2)
+        };
+        let open = if self.is_damaged {
+            ColumnReader::open_damaged
+        } else {
+            ColumnReader::open
+        };
+        let mut reader = match known {
+            Some(reader) => reader,
+            None => open(&self.below, &self.folder, self.number, column)?,
+        };
+        let value = read(&mut reader)?;
+        let mut open = open_columns();
+        if open.len() >= MOST_OPEN {
+            open.remove(0);
+        }
+        open.push((self.key, column, reader));
+        Ok(value)
     }
 
     /// The encoded and packed motion of a run; `None` if it is not kept.
@@ -325,7 +353,7 @@ fn readable_frames(
         return Ok(BTreeMap::new());
     }
     let bytes = folder::read_all(below, &file)?;
-    let mut reader = ColumnReader::open(below, folder, number, column)?;
+    let mut reader = ColumnReader::open_damaged(below, folder, number, column)?;
     let frames = whole_frames(&bytes).into_iter();
     let readable = frames.filter_map(|(place, content)| {
         let index = PackedFrame::parse(content)?.index;

@@ -1,9 +1,9 @@
 //! Writes the runs of one process into a new segment.
 
-use std::io::{self, BufReader, Read as _};
+use std::io::{self, BufReader, BufWriter, Read as _, Write};
 use std::path::{Path, PathBuf};
 
-use crate::segment::frame::{FrameFault, Frames, ReadFault, SegmentColumn};
+use crate::segment::frame::{FrameFault, Frames, HEAD, ReadFault, SegmentColumn, put};
 use crate::segment::packed::{ColumnWriter, path};
 use crate::segment::row::{Places, TextTable, encode_row};
 use crate::stored_run::StoredRun;
@@ -114,24 +114,33 @@ impl SegmentWriter {
 /// Copies the first `end` bytes of a column, which are whole frames, into a new file. Checks them.
 ///
 /// # Errors
-/// A frame is damaged; reading or writing failed.
+/// The column is missing or damaged, or can't be read; `Ok(Err(…))`: writing failed.
 pub(crate) fn copy_column(
     from: &Below,
     old: &Path,
     column: SegmentColumn,
     end: u64,
-    to: &Below,
-    new: &Path,
-) -> Result<(), ReadFault> {
+    new: impl Write,
+) -> Result<io::Result<()>, ReadFault> {
     let source = BufReader::new(from.open(old)?.take(end));
     let mut frames = Frames::new(column, source)?;
-    let mut writer = ColumnWriter::create(to, new, column)?;
-    let mut content = Vec::new();
-    while frames.next(&mut content)?.is_some() {
-        writer.append(&content)?;
+    let (mut writer, mut written) = (BufWriter::new(new), HEAD as u64);
+    let (mut content, mut bytes) = (Vec::new(), column.head().to_vec());
+    loop {
+        if let Err(error) = writer.write_all(&bytes) {
+            return Ok(Err(error));
+        }
+        bytes.clear();
+        if frames.next(&mut content)?.is_none() {
+            break;
+        }
+        match put(written, &content, &mut bytes) {
+            Ok(place) => written = place.end(),
+            Err(error) => return Ok(Err(error)),
+        }
     }
-    if writer.end() != end {
-        return Err(FrameFault::Missing(writer.end()).into());
+    if written != end {
+        return Err(FrameFault::Missing(written).into());
     }
-    Ok(writer.sync()?)
+    Ok(writer.flush())
 }

@@ -59,6 +59,7 @@ impl Dataset {
     }
 
     /// Returns the number of a term that was interned before.
+    #[cfg(test)]
     pub(crate) fn number(&self, term: TermRef<'_>) -> Option<TermNumber> {
         self.terms.find(&Parts::of_term(term)).map(TermNumber)
     }
@@ -124,6 +125,7 @@ impl Dataset {
     }
 
     /// Returns whether there are no statements except pending ones.
+    #[cfg(test)]
     pub(crate) fn is_empty(&self) -> bool {
         self.len() == 0
     }
