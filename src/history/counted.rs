@@ -103,7 +103,7 @@ impl History {
     /// A file is damaged or can't be read.
     pub fn selected_campaigns(&self) -> Result<BTreeSet<String>, Diagnostics> {
         let mut selected = BTreeSet::new();
-        for state in self.campaign_states()? {
+        for state in self.stored.states()? {
             let record = &state.record;
             let is_case = || {
                 let pattern = IS_CASE.as_ref();
@@ -111,7 +111,7 @@ impl History {
             };
             let is_selected = record.name.starts_with(FAILED_AGAIN)
                 || is_case()
-                || self.runs_of(&record.id)?.iter().any(|run| run.row.is_shrunk);
+                || self.stored.runs_of(&record.id)?.iter().any(|run| run.row.is_shrunk);
             if is_selected {
                 selected.insert(record.id.clone());
             }

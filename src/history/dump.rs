@@ -9,7 +9,7 @@ use oxigraph::model::Quad;
 
 use crate::rdf_text::serializer;
 use crate::statements::Statements;
-use crate::view::{Demand, Source, WithFacts};
+use crate::view::{Demand, StatementMaker, WithFacts};
 use crate::{History, RdfSyntax, write_campaign};
 use actcheck_base::{Diagnostic, Diagnostics, NewFile};
 
@@ -24,15 +24,15 @@ impl History {
         each: &mut dyn FnMut(Vec<Quad>) -> Result<(), Diagnostics>,
     ) -> Result<(), Diagnostics> {
         let demand = Demand::all();
-        for state in self.campaign_states()? {
+        for state in self.stored.states()? {
             let mut statements = Statements::new(&demand);
             write_campaign::write(&state, &mut statements);
             each(statements.quads)?;
-            let runs = self.runs_of(&state.record.id)?;
-            let source = Source::new(self, &runs.id);
+            let runs = self.stored.runs_of(&state.record.id)?;
+            let maker = StatementMaker::new(&self.stored, &runs.id);
             for run in runs.iter() {
                 let later = runs.later_of(run.row.index);
-                each(source.statements(run, &later, &demand, facts)?.quads)?;
+                each(maker.statements(run, &later, &demand, facts)?.quads)?;
             }
         }
         Ok(())

@@ -70,7 +70,8 @@ impl History {
     /// Writing failed: `H005`, `H006`. Runs stored before are complete.
     pub fn write(&self, entry: &Entry) -> Result<(), Diagnostics> {
         let doing = format!("writing run {}", entry.run.id_in(&entry.campaign));
-        self.with_segment(&entry.campaign, &doing, |segment| {
+        let folder = &self.stored.folder;
+        self.segments.with_segment(folder, &entry.campaign, &doing, |segment| {
             segment.append(&RunContent {
                 run: &entry.run,
                 states: &entry.states,

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use crate::campaign::{CampaignRuns, RunAt};
 use crate::campaign_state::CampaignState;
+use crate::campaigns::StoredCampaigns;
 use crate::folder::{CampaignExtent, Folder};
 use crate::history::run_id;
 use crate::segment::{ReadFault, Segment, SegmentColumn, read_judgements, salvage_judgements};
@@ -46,7 +47,7 @@ impl History {
     pub fn examine(dir: &Path) -> Result<(Integrity, Self), Diagnostics> {
         let history = Self::open_to_read(dir)?;
         let mut found = Integrity::default();
-        let extent = history.extent()?;
+        let extent = history.stored.extent()?;
         for (id, extent) in &extent.campaigns {
             history.examine_campaign(id, extent, &mut found)?;
         }
@@ -67,8 +68,8 @@ impl History {
         extent: &CampaignExtent,
         found: &mut Integrity,
     ) -> Result<(), Diagnostics> {
-        let (below, folder) = (self.folder.below(), self.folder.campaign(id));
-        let relative = |file: &Path| self.folder.relative(file).to_path_buf();
+        let (below, folder) = (self.stored.folder.below(), self.stored.folder.campaign(id));
+        let relative = |file: &Path| self.stored.folder.relative(file).to_path_buf();
         let state = match CampaignState::read(&below, &folder, id) {
             Ok(state) => Some(state),
             Err(why) => {
@@ -138,7 +139,7 @@ impl History {
                 reason: "it is shorter than it was".to_owned(),
             });
         }
-        let is_locked = self.folder.is_locked();
+        let is_locked = self.stored.folder.is_locked();
         for tail in self.torn_tails(&runs)? {
             let is_lost = tail.without_row.len() > 1
                 && !is_locked
@@ -184,7 +185,8 @@ impl History {
         }
         all_lost.sort();
         all_lost.dedup();
-        Ok((Self::of_salvaged(folder, campaigns), all_lost))
+        let stored = StoredCampaigns::of_salvaged(folder, campaigns);
+        Ok((Self::with(stored), all_lost))
     }
 }
 

@@ -90,7 +90,7 @@ impl History {
         let ids: Vec<String> = match &filter.campaign {
             Some(id) => vec![id.clone()],
             None => {
-                let states = self.campaign_states()?;
+                let states = self.stored.states()?;
                 states.iter().map(|state| state.record.id.clone()).collect()
             }
         };
@@ -100,7 +100,7 @@ impl History {
             rules: LaterRules::new(),
         };
         for id in ids {
-            let runs = self.runs_of(&id)?;
+            let runs = self.stored.runs_of(&id)?;
             for run in runs.iter().filter(|run| run.matches(filter)) {
                 let later = match wish.judgements {
                     Judgements::Newest => newest(runs.later_of(run.row.index)),

@@ -6,6 +6,7 @@
 mod answer;
 mod campaign;
 mod campaign_state;
+mod campaigns;
 mod counted;
 mod dump;
 mod entry;
@@ -45,6 +46,7 @@ mod wire;
 mod write_campaign;
 mod write_run;
 mod write_scene;
+mod writers;
 
 pub use answer::{Cancel, QueryAnswer};
 pub use counted::{FAILED_AGAIN, newest_of_alike, without_counts};

@@ -4,7 +4,7 @@ use oxigraph::model::{GraphName, NamedNode, NamedOrBlankNode, Quad, Term};
 
 use crate::history::run_id;
 use crate::statements::Statements;
-use crate::view::{Demand, Source, WithFacts};
+use crate::view::{Demand, StatementMaker, WithFacts};
 use crate::write_campaign::{self, campaign_node};
 use crate::write_run::run_node;
 use crate::History;
@@ -41,7 +41,7 @@ impl History {
         } else {
             WithFacts::Lean
         };
-        let states = self.campaign_states()?;
+        let states = self.stored.states()?;
         for state in &states {
             let mut statements = Statements::new(&demand);
             write_campaign::write(state, &mut statements);
@@ -49,11 +49,11 @@ impl History {
             each(part(&node, true, statements.quads))?;
         }
         for state in &states {
-            let runs = self.runs_of(&state.record.id)?;
-            let source = Source::new(self, &runs.id);
+            let runs = self.stored.runs_of(&state.record.id)?;
+            let maker = StatementMaker::new(&self.stored, &runs.id);
             for run in runs.iter() {
                 let later = runs.later_of(run.row.index);
-                let quads = source.statements(run, &later, &demand, facts)?.quads;
+                let quads = maker.statements(run, &later, &demand, facts)?.quads;
                 let node = run_node(&run_id(&runs.id, run.row.index));
                 each(part(&node, false, quads))?;
             }
@@ -66,10 +66,10 @@ impl History {
     /// # Errors
     /// The history can't be read.
     pub fn parts(&self) -> Result<usize, Diagnostics> {
-        let ids = self.campaign_ids()?;
+        let ids = self.stored.ids()?;
         let mut count = ids.len();
         for id in &ids {
-            count += self.runs_of(id)?.len();
+            count += self.stored.runs_of(id)?.len();
         }
         Ok(count)
     }

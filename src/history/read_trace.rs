@@ -85,7 +85,7 @@ impl History {
     }
 
     fn recorded_of(&self, id: &str) -> Result<(Vec<Choice>, Trace), Diagnostics> {
-        let recorded = self.with_run(id, |_, run| self.recorded_at(id, run))?;
+        let recorded = self.stored.with_run(id, |_, run| self.recorded_at(id, run))?;
         recorded.ok_or_else(|| fault::no_run(self.dir(), id))
     }
 
@@ -100,7 +100,7 @@ impl History {
             .map_err(|why| self.undecodable(id, run, SegmentColumn::States, &why))?;
         if recorded.1.hash != run.row.trace_hash() {
             let why = "these are the states of another run";
-            return Err(fault::undecodable(&self.folder, id, run, SegmentColumn::States, why));
+            return Err(fault::undecodable(&self.stored.folder, id, run, SegmentColumn::States, why));
         }
         Ok(recorded)
     }
@@ -118,7 +118,7 @@ impl History {
     /// A trace with its motion, or a part of it: as it is kept, or simulated again. Returns `None`
     /// if this would start a program without consent.
     fn with_motion(&self, id: &str, add: AddMotion) -> Result<Option<Trace>, Diagnostics> {
-        let kept = self.with_run(id, |_, run| {
+        let kept = self.stored.with_run(id, |_, run| {
             let motion = run.segment.motion(run.row);
             let motion = motion.map_err(|why| self.unread(id, run, SegmentColumn::Motion, &why))?;
             let Some(motion) = motion else {
@@ -191,7 +191,7 @@ impl History {
         column: SegmentColumn,
         why: &ReadFault,
     ) -> Diagnostics {
-        fault::run(&self.folder, id, run, column, why)
+        fault::run(&self.stored.folder, id, run, column, why)
     }
 
     fn undecodable(
@@ -201,6 +201,6 @@ impl History {
         column: SegmentColumn,
         why: &CodecFault,
     ) -> Diagnostics {
-        fault::undecodable(&self.folder, id, run, column, &why.to_string())
+        fault::undecodable(&self.stored.folder, id, run, column, &why.to_string())
     }
 }

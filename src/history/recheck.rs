@@ -82,7 +82,7 @@ impl<'h> NewestJudgements<'h> {
         });
         if is_judged {
             let stored = at.segment.run(at.row).map_err(|why| {
-                fault::run(&self.history.folder, run, at, SegmentColumn::Details, &why)
+                fault::run(&self.history.stored.folder, run, at, SegmentColumn::Details, &why)
             })?;
             let action = stored.actions.into_iter().nth(step as usize - 1);
             for judgement in action.into_iter().flat_map(|action| action.judgements) {
@@ -109,7 +109,7 @@ impl<'h> NewestJudgements<'h> {
             return Ok(Arc::clone(known));
         }
         drop(known);
-        let runs = self.history.runs_of(id)?;
+        let runs = self.history.stored.runs_of(id)?;
         let mut known = self.known.write().unwrap_or_else(PoisonError::into_inner);
         Ok(Arc::clone(known.entry(id.to_owned()).or_insert(runs)))
     }
@@ -134,7 +134,7 @@ impl History {
     /// As [`History::run`].
     pub fn newest_run(&self, name: &str) -> Result<RunDetail, Diagnostics> {
         let mut run = self.run(name)?;
-        let runs = self.runs_of(&run.row.campaign)?;
+        let runs = self.stored.runs_of(&run.row.campaign)?;
         let later = newest(runs.later_of(run.row.index));
         if later.is_empty() {
             return Ok(run);
@@ -171,8 +171,8 @@ impl History {
     /// A file is damaged or can't be read.
     pub fn later_counts(&self) -> Result<BTreeMap<String, u64>, Diagnostics> {
         let mut counts = BTreeMap::new();
-        for id in self.campaign_ids()? {
-            let count = self.runs_of(&id)?.later.len() as u64;
+        for id in self.stored.ids()? {
+            let count = self.stored.runs_of(&id)?.later.len() as u64;
             if count > 0 {
                 counts.insert(id, count);
             }
@@ -200,7 +200,9 @@ impl History {
         of_campaigns
             .into_iter()
             .try_for_each(|(campaign, judgements)| {
-                self.with_judgements(campaign, |column| column.append(&judgements))
+                let folder = &self.stored.folder;
+                self.segments
+                    .with_judgements(folder, campaign, |column| column.append(&judgements))
             })
     }
 
@@ -209,8 +211,8 @@ impl History {
     /// # Errors
     /// Writing failed: `H005`, `H006`.
     pub fn finish_rechecks(&self) -> Result<(), Diagnostics> {
-        for campaign in self.judged_campaigns() {
-            self.close_writers(&campaign)?;
+        for campaign in self.segments.judged_campaigns() {
+            self.segments.close(&self.stored.folder, &campaign)?;
             self.change_state(&campaign, |_| ())?;
         }
         Ok(())

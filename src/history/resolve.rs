@@ -31,7 +31,7 @@ impl History {
         if names::is_id(name) && self.has_run(name)? {
             return Ok(name.to_owned());
         }
-        let known = self.all_run_ids()?;
+        let known = self.stored.run_ids()?;
         let beginning: Vec<&String> = known
             .iter()
             .filter(|id| !name.is_empty() && id.starts_with(name))

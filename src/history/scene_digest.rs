@@ -25,7 +25,7 @@ impl History {
     pub fn scenes(&self, runs: &[RunRow]) -> Result<BTreeMap<String, SceneDigest>, Diagnostics> {
         let mut scenes = BTreeMap::new();
         for row in runs {
-            let of_campaign = self.runs_of(&row.campaign)?;
+            let of_campaign = self.stored.runs_of(&row.campaign)?;
             if let Some(run) = of_campaign.find(row.index) {
                 scenes.insert(row.run.clone(), run.row.scene());
             }

@@ -41,15 +41,15 @@ impl History {
     /// A file is damaged or can't be read.
     pub fn tail_warning(&self) -> Result<Option<Diagnostic>, Diagnostics> {
         // Another process may be writing.
-        if self.is_salvaged() || (!self.folder.is_own() && self.folder.is_locked()) {
+        if self.stored.is_salvaged() || (!self.stored.folder.is_own() && self.stored.folder.is_locked()) {
             return Ok(None);
         }
-        for state in self.campaign_states()? {
+        for state in self.stored.states()? {
             // The file of a campaign that has ended says how many runs it has.
             if state.end.is_some() {
                 continue;
             }
-            let runs = self.runs_of(&state.record.id)?;
+            let runs = self.stored.runs_of(&state.record.id)?;
             let tails = self.torn_tails(&runs)?;
             if let Some(tail) = tails.iter().find(|tail| tail.may_lose_runs()) {
                 return Ok(Some(self.lost(tail)));
@@ -79,7 +79,7 @@ impl History {
             ),
         };
         let (file, dir) = (
-            self.folder.relative(&tail.file).display(),
+            self.stored.folder.relative(&tail.file).display(),
             self.dir().display(),
         );
         let message = if tail.is_cut {
@@ -94,7 +94,7 @@ impl History {
 
     /// The ends of a campaign's segments that are not as a finished process leaves them.
     pub(crate) fn torn_tails(&self, runs: &CampaignRuns) -> Result<Vec<TornTail>, Diagnostics> {
-        let (below, folder) = (self.folder.below(), self.folder.campaign(&runs.id));
+        let (below, folder) = (self.stored.folder.below(), self.stored.folder.campaign(&runs.id));
         let mut tails: Vec<TornTail> = runs
             .torn
             .iter()
@@ -104,7 +104,7 @@ impl History {
                 without_row: Vec::new(),
             })
             .collect();
-        let extent = self.folder.campaign_extent(&runs.id)?.unwrap_or_default();
+        let extent = self.stored.folder.campaign_extent(&runs.id)?.unwrap_or_default();
         for number in extent.segments.keys() {
             let segment = runs.segments.iter().find(|own| own.number() == *number);
             let end = segment

@@ -41,7 +41,7 @@ impl History {
         mut each: impl FnMut(&RunVitals),
     ) -> Result<(), Diagnostics> {
         self.campaign(campaign)?;
-        let runs = self.runs_of(campaign)?;
+        let runs = self.stored.runs_of(campaign)?;
         for run in runs.iter() {
             let id = run_id(campaign, run.row.index);
             let unread = |why| self.unread(&id, run, SegmentColumn::States, &why);
@@ -74,7 +74,7 @@ impl History {
     pub fn cost_of_motion(&self, runs: &[RunRow]) -> Result<(usize, f64), Diagnostics> {
         let (mut count, mut secs) = (0, 0.0);
         for row in runs {
-            let of_campaign = self.runs_of(&row.campaign)?;
+            let of_campaign = self.stored.runs_of(&row.campaign)?;
             let run = of_campaign.find(row.index).filter(|run| !run.row.is_whole());
             if let Some(run) = run {
                 count += 1;

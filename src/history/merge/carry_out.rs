@@ -12,6 +12,7 @@ use crate::merge::survey::identity;
 use crate::segment::{
     LaterJudgement, RunContent, Segment, SegmentColumn, copy_column,
 };
+use crate::writers::next_segment;
 use crate::{FAILED_AGAIN, History, fault};
 use actcheck_base::Diagnostics;
 
@@ -52,11 +53,11 @@ pub fn carry_out(
         writer.begin(campaign)?;
         if !writer.add_runs(campaign, stop, &mut on_run)? {
             writer.merged.interrupted = true;
-            into.close_writers(&campaign.id)?;
+            into.segments.close(&into.stored.folder, &campaign.id)?;
             return Ok(writer.merged);
         }
         writer.add_judgements(campaign)?;
-        into.close_writers(&campaign.id)?;
+        into.segments.close(&into.stored.folder, &campaign.id)?;
         writer.end(campaign)?;
     }
     Ok(writer.merged)
@@ -101,10 +102,10 @@ impl Writer<'_> {
     fn begin(&self, campaign: &PlannedMerge) -> Result<(), Diagnostics> {
         let work = &campaign.work;
         let (source, copied) = &work.record;
-        let mut state = match self.into.state_of(&campaign.id)? {
+        let mut state = match self.into.stored.state_of(&campaign.id)? {
             Some(known) => (*known).clone(),
             None => CampaignState {
-                number: self.into.campaign_ids()?.len() as u64,
+                number: self.into.stored.ids()?.len() as u64,
                 segments: BTreeMap::new(),
                 ..copied.clone()
             },
@@ -144,7 +145,7 @@ impl Writer<'_> {
         let origins: BTreeSet<&(usize, String)> = wanted.values().collect();
         for origin in origins {
             let (source, id) = (origin.0, &origin.1);
-            let runs = self.sources[source].runs_of(id)?;
+            let runs = self.sources[source].stored.runs_of(id)?;
             let is_wanted = |index: u64| wanted.get(&index) == Some(origin);
             for segment in &runs.segments {
                 if stop.load(Ordering::Relaxed) {
@@ -194,12 +195,12 @@ impl Writer<'_> {
             })
         };
         let is_shrunk = || segment.rows().iter().any(|row| row.is_shrunk);
-        if history.is_salvaged() || segment.rows().is_empty() || is_shrunk() || has_twice() {
+        if history.stored.is_salvaged() || segment.rows().is_empty() || is_shrunk() || has_twice() {
             return Ok(false);
         }
-        let (from, to) = (history.folder.below(), self.into.folder.below());
-        let folder = self.into.folder.campaign(&campaign.id);
-        let number = self.into.next_segment(&campaign.id)?;
+        let (from, to) = (history.stored.folder.below(), self.into.stored.folder.below());
+        let folder = self.into.stored.folder.campaign(&campaign.id);
+        let number = next_segment(&self.into.stored.folder, &campaign.id)?;
         let unwritten = |error| fault::io(self.into.dir(), "writing merged data", &error);
         let mut files = Vec::new();
         for column in SegmentColumn::OF_RUNS {
@@ -211,7 +212,7 @@ impl Writer<'_> {
             let new = to.new_file(&new).map_err(unwritten)?;
             let writer = new.writer().map_err(unwritten)?;
             copy_column(&from, &old, column, end, writer)
-                .map_err(|why| fault::segment(&history.folder, &old, &why))?
+                .map_err(|why| fault::segment(&history.stored.folder, &old, &why))?
                 .map_err(unwritten)?;
             files.push(new);
         }
@@ -254,7 +255,8 @@ impl Writer<'_> {
             .packed_motion(run.row)
             .map_err(unread(SegmentColumn::Motion))?;
         let doing = format!("writing run {}", run_id(&campaign.id, index));
-        self.into.with_segment(&campaign.id, &doing, |segment| {
+        let into = &self.into.stored.folder;
+        self.into.segments.with_segment(into, &campaign.id, &doing, |segment| {
             segment.append(&RunContent {
                 run: &stored,
                 states: &states,
@@ -268,7 +270,7 @@ impl Writer<'_> {
     /// Adds the later judgements of runs that the destination lacks, in the order in which they
     /// were made.
     fn add_judgements(&self, campaign: &PlannedMerge) -> Result<(), Diagnostics> {
-        let known = self.into.runs_of(&campaign.id)?;
+        let known = self.into.stored.runs_of(&campaign.id)?;
         let known: BTreeSet<(u64, String)> = known
             .later
             .iter()
@@ -278,7 +280,7 @@ impl Writer<'_> {
         let origins: BTreeSet<&(usize, String)> =
             work.runs.values().chain(work.judgements.values()).collect();
         for origin in origins {
-            let runs = self.sources[origin.0].runs_of(&origin.1)?;
+            let runs = self.sources[origin.0].stored.runs_of(&origin.1)?;
             let is_new = |later: &&LaterJudgement| {
                 let of_run = [&work.runs, &work.judgements];
                 of_run.iter().any(|runs| runs.get(&later.index) == Some(origin))
@@ -286,8 +288,10 @@ impl Writer<'_> {
             };
             let new: Vec<LaterJudgement> = runs.later.iter().filter(is_new).cloned().collect();
             if !new.is_empty() {
+                let into = &self.into.stored.folder;
                 self.into
-                    .with_judgements(&campaign.id, |column| column.append(&new))?;
+                    .segments
+                    .with_judgements(into, &campaign.id, |column| column.append(&new))?;
             }
         }
         Ok(())

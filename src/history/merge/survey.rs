@@ -96,9 +96,9 @@ impl Found {
 pub(super) fn survey(history: &History, source: Option<usize>) -> Result<Vec<Found>, Diagnostics> {
     let shrunk = history.selected_campaigns()?;
     let mut all = Vec::new();
-    for state in history.campaign_states()? {
+    for state in history.stored.states()? {
         let id = state.record.id.clone();
-        let of_campaign = history.runs_of(&id)?;
+        let of_campaign = history.stored.runs_of(&id)?;
         let mut later: BTreeMap<u64, BTreeSet<String>> = BTreeMap::new();
         for judgement in &of_campaign.later {
             let texts = later.entry(judgement.index).or_default();

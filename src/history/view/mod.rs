@@ -11,6 +11,7 @@ use oxigraph::model::{GraphName, NamedNode, Quad};
 
 use crate::campaign::{CampaignRuns, RunAt};
 use crate::campaign_state::CampaignState;
+use crate::campaigns::StoredCampaigns;
 use crate::folder::FolderExtent;
 use crate::history::run_id;
 use crate::segment::{LaterJudgement, SegmentColumn};
@@ -78,61 +79,75 @@ struct Missing {
 }
 
 impl History {
-    /// Returns the demanded statements, and maybe others.
+    /// Returns the statements that a query demands, and maybe others.
     ///
     /// # Errors
     /// `H030` these are too many; a file is damaged or can't be read.
     pub(crate) fn dataset(&self, demand: Demand) -> Result<Arc<Dataset>, Diagnostics> {
+        let source = RunSource {
+            stored: &self.stored,
+            threads: self.threads(),
+        };
         let mut view = self.view.lock().unwrap_or_else(PoisonError::into_inner);
-        let extent = self.extent()?;
-        if view.extent != extent || self.is_salvaged() {
-            self.follow(&mut view)?;
-            view.extent = extent;
+        view.dataset(source, demand)
+    }
+}
+
+impl View {
+    /// Returns the demanded statements, and maybe others.
+    ///
+    /// # Errors
+    /// `H030` these are too many; a file is damaged or can't be read.
+    fn dataset(
+        &mut self,
+        source: RunSource<'_>,
+        demand: Demand,
+    ) -> Result<Arc<Dataset>, Diagnostics> {
+        let extent = source.stored.extent()?;
+        if self.extent != extent || source.stored.is_salvaged() {
+            self.follow(source)?;
+            self.extent = Arc::clone(&extent);
         }
-        let missing = demand.clone().beyond(&view.demand);
+        let missing = demand.clone().beyond(&self.demand);
         if !missing.is_empty() {
-            let all = self.missing(&HashMap::new())?;
-            let count = self.estimate(&all, &missing)?;
+            let all = source.missing(&HashMap::new())?;
+            let count = source.estimate(&all, &missing)?;
             if count > MOST_STATEMENTS {
-                return Err(too_many(self, count));
+                return Err(too_many(source.stored, count));
             }
-            if count + view.dataset.len() as u64 > MOST_STATEMENTS {
-                *view = View::default();
-                view.extent = self.extent()?;
-                self.follow(&mut view)?;
-                self.widen(&mut view, &all, demand)?;
+            if count + self.dataset.len() as u64 > MOST_STATEMENTS {
+                *self = Self::default();
+                self.follow(source)?;
+                self.extent = extent;
+                self.widen(source, &all, demand)?;
             } else {
-                self.widen(&mut view, &all, missing)?;
+                self.widen(source, &all, missing)?;
             }
         }
-        Ok(Arc::clone(&view.dataset))
+        Ok(Arc::clone(&self.dataset))
     }
 
     /// Adds the statements of a further demand about all runs.
-    fn widen(&self, view: &mut View, all: &[Missing], demand: Demand) -> Result<(), Diagnostics> {
-        let dataset = Arc::make_mut(&mut view.dataset);
-        let added = self.add_campaigns(&demand, dataset);
-        let added = added.and_then(|()| self.add_runs(all, &demand, dataset));
+    fn widen(
+        &mut self,
+        source: RunSource<'_>,
+        all: &[Missing],
+        demand: Demand,
+    ) -> Result<(), Diagnostics> {
+        let dataset = Arc::make_mut(&mut self.dataset);
+        let added = source.add_campaigns(&demand, dataset);
+        let added = added.and_then(|()| source.add_runs(all, &demand, dataset));
         dataset.merge_pending();
         added?;
-        view.demand.add(demand);
-        Ok(())
-    }
-
-    fn add_campaigns(&self, demand: &Demand, dataset: &mut Dataset) -> Result<(), Diagnostics> {
-        for state in self.campaign_states()? {
-            let mut statements = Statements::new(demand);
-            write_campaign::write(&state, &mut statements);
-            dataset.extend(statements.quads);
-        }
+        self.demand.add(demand);
         Ok(())
     }
 
     /// Adds the statements of runs and judgements that are new since the state that a view shows.
-    fn follow(&self, view: &mut View) -> Result<(), Diagnostics> {
-        let states = self.campaign_states()?;
+    fn follow(&mut self, source: RunSource<'_>) -> Result<(), Diagnostics> {
+        let states = source.stored.states()?;
         let is_changed = |state: &Arc<CampaignState>| {
-            let known = view.taken.get(&state.record.id);
+            let known = self.taken.get(&state.record.id);
             known.and_then(|taken| taken.state.as_ref()).is_some_and(|before| {
                 // An end that is added leaves the other statements as they are.
                 let mut grown = (**before).clone();
@@ -142,28 +157,28 @@ impl History {
             })
         };
         if states.iter().any(is_changed) {
-            let demand = std::mem::take(&mut view.demand);
-            *view = View {
+            let demand = std::mem::take(&mut self.demand);
+            *self = Self {
                 demand,
-                ..View::default()
+                ..Self::default()
             };
         }
-        let missing = self.missing(&view.taken)?;
-        if !view.demand.is_empty() {
-            let demand = view.demand.clone();
-            let dataset = Arc::make_mut(&mut view.dataset);
-            let added = self.add_campaigns(&demand, dataset);
-            let added = added.and_then(|()| self.add_runs(&missing, &demand, dataset));
+        let missing = source.missing(&self.taken)?;
+        if !self.demand.is_empty() {
+            let demand = self.demand.clone();
+            let dataset = Arc::make_mut(&mut self.dataset);
+            let added = source.add_campaigns(&demand, dataset);
+            let added = added.and_then(|()| source.add_runs(&missing, &demand, dataset));
             dataset.merge_pending();
             if let Err(faults) = added {
                 // It is made anew by the next query.
-                *view = View::default();
+                *self = Self::default();
                 return Err(faults);
             }
         }
         for state in states {
             let id = state.record.id.clone();
-            let runs = self.runs_of(&id)?;
+            let runs = source.stored.runs_of(&id)?;
             let rows = runs.segments.iter();
             let rows = rows.map(|segment| (segment.number(), segment.rows().len()));
             let taken = Taken {
@@ -171,7 +186,26 @@ impl History {
                 rows: rows.collect(),
                 later: runs.later.len(),
             };
-            view.taken.insert(id, taken);
+            self.taken.insert(id, taken);
+        }
+        Ok(())
+    }
+}
+
+/// The stored runs of which statements are made.
+#[derive(Clone, Copy)]
+struct RunSource<'s> {
+    stored: &'s StoredCampaigns,
+    /// Greatest number of threads that make them.
+    threads: usize,
+}
+
+impl RunSource<'_> {
+    fn add_campaigns(&self, demand: &Demand, dataset: &mut Dataset) -> Result<(), Diagnostics> {
+        for state in self.stored.states()? {
+            let mut statements = Statements::new(demand);
+            write_campaign::write(&state, &mut statements);
+            dataset.extend(statements.quads);
         }
         Ok(())
     }
@@ -179,9 +213,9 @@ impl History {
     /// The runs of each campaign that have not been taken, or were judged since.
     fn missing(&self, taken: &HashMap<String, Taken>) -> Result<Vec<Missing>, Diagnostics> {
         let mut missing = Vec::new();
-        for state in self.campaign_states()? {
+        for state in self.stored.states()? {
             let id = &state.record.id;
-            let runs = self.runs_of(id)?;
+            let runs = self.stored.runs_of(id)?;
             let indices = match taken.get(id) {
                 None => runs.iter().map(|run| run.row.index).collect(),
                 Some(taken) => {
@@ -216,8 +250,8 @@ impl History {
         for (of, index) in runs.step_by(step) {
             if let Some(run) = of.runs.find(index) {
                 let later = of.runs.later_of(index);
-                let source = Source::new(self, &of.runs.id);
-                let made = source.statements(run, &later, demand, WithFacts::Lean)?;
+                let maker = StatementMaker::new(self.stored, &of.runs.id);
+                let made = maker.statements(run, &later, demand, WithFacts::Lean)?;
                 count += made.quads.len();
                 sampled += 1;
             }
@@ -238,14 +272,14 @@ impl History {
             .flat_map(|of| of.indices.chunks(CHUNK).map(|chunk| (&*of.runs, chunk)))
             .collect();
         let make = |(runs, indices): (&CampaignRuns, &[u64])| {
-            let source = Source::new(self, &runs.id);
+            let maker = StatementMaker::new(self.stored, &runs.id);
             let mut made = Vec::with_capacity(indices.len());
             for index in indices {
                 let Some(run) = runs.find(*index) else {
                     continue;
                 };
                 let later = runs.later_of(*index);
-                made.push(source.statements(run, &later, demand, WithFacts::Lean)?);
+                made.push(maker.statements(run, &later, demand, WithFacts::Lean)?);
             }
             Ok::<_, Diagnostics>(made)
         };
@@ -257,7 +291,7 @@ impl History {
                 }
             }
         };
-        let threads = self.threads().min(chunks.len());
+        let threads = self.threads.min(chunks.len());
         if threads < 2 {
             for chunk in chunks {
                 take(make(chunk)?);
@@ -295,14 +329,14 @@ impl History {
 
 /// Makes the statements about runs of a campaign.
 #[derive(Clone, Copy)]
-pub(crate) struct Source<'h> {
-    history: &'h History,
-    campaign: &'h str,
+pub(crate) struct StatementMaker<'s> {
+    stored: &'s StoredCampaigns,
+    campaign: &'s str,
 }
 
-impl<'h> Source<'h> {
-    pub(crate) fn new(history: &'h History, campaign: &'h str) -> Self {
-        Self { history, campaign }
+impl<'s> StatementMaker<'s> {
+    pub(crate) fn new(stored: &'s StoredCampaigns, campaign: &'s str) -> Self {
+        Self { stored, campaign }
     }
 
     /// The demanded statements about a run. `later`: its later judgements.
@@ -322,7 +356,7 @@ impl<'h> Source<'h> {
         let mut made = RunStatements::default();
         if demand.has_details_of(&node, rechecked.as_str()) {
             let unread =
-                |why| fault::run(&self.history.folder, &id, run, SegmentColumn::Details, &why);
+                |why| fault::run(&self.stored.folder, &id, run, SegmentColumn::Details, &why);
             let stored = run.segment.run(run.row).map_err(unread)?;
             let mut statements = Statements::new(demand);
             write_run::write(&stored, self.campaign, &mut statements);
@@ -350,7 +384,7 @@ impl<'h> Source<'h> {
         facts: WithFacts,
         made: &mut RunStatements,
     ) -> Result<(), Diagnostics> {
-        let folder = &self.history.folder;
+        let folder = &self.stored.folder;
         let unread = |why| fault::run(folder, id, run, SegmentColumn::States, &why);
         let states = run.segment.states(run.row);
         let (_, trace) = decode_head(&states.map_err(unread)?).map_err(|why| {
@@ -386,11 +420,11 @@ impl<'h> Source<'h> {
 }
 
 /// The error of a query that needs too many statements.
-fn too_many(history: &History, count: u64) -> Diagnostics {
+fn too_many(stored: &StoredCampaigns, count: u64) -> Diagnostics {
     let message = format!(
         "the query needs about {} million statements about the runs of `{}`, more than fit in memory",
         count.div_ceil(1_000_000),
-        history.dir().display(),
+        stored.folder.dir().display(),
     );
     Diagnostic::error("H030", message)
         .help(
