@@ -196,7 +196,8 @@ fn make_shard(env: &Env, made: &[RunRecord], size: u64, shard: Shard, folder: &P
             let changed =
                 |index: &u64| changed(&made[*index as usize % made.len()], campaign, *index, rate);
             let runs: Vec<RunRecord> = indices.iter().map(changed).collect();
-            runs.iter().for_each(|run| history.commit_outcomes(run).expect("the disk has room"));
+            runs.iter()
+                .for_each(|run| history.commit_outcomes(run).expect("the disk has room"));
         }
         let end = CampaignEnd {
             ended: "2026-01-02T00:00:00.000Z".to_owned(),

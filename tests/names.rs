@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// Crates whose names are not unique yet, with the largest number of names that occur more than
 /// once. It may only be reduced.
-const EXEMPT: [(&str, usize); 2] = [("history", 12), ("remote", 1)];
+const EXEMPT: [(&str, usize); 1] = [("remote", 1)];
 
 /// The Rust files of a folder and its subfolders, sorted.
 fn rust_files(folder: &Path) -> Vec<PathBuf> {

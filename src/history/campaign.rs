@@ -3,7 +3,9 @@
 use std::collections::{BTreeMap, HashMap};
 
 use crate::folder::{CampaignExtent, Folder};
-use crate::segment::{LaterJudgement, ReadFault, RunEntry, Segment, SegmentColumn, read_judgements};
+use crate::segment::{
+    LaterJudgement, ReadFault, RunEntry, Segment, SegmentColumn, read_judgements,
+};
 use crate::{RunFilter, RunRow, fault};
 use actcheck_base::Diagnostics;
 
@@ -106,12 +108,12 @@ impl CampaignRuns {
 
     /// The file of a segment that has fewer runs or judgements than it had when the campaign's own
     /// file was written.
-    pub(crate) fn shortened(
-        &self,
-        recorded: &BTreeMap<u32, [u64; 2]>,
-    ) -> Option<String> {
+    pub(crate) fn shortened(&self, recorded: &BTreeMap<u32, [u64; 2]>) -> Option<String> {
         recorded.iter().find_map(|(number, [runs, batches])| {
-            let segment = self.segments.iter().find(|segment| segment.number() == *number);
+            let segment = self
+                .segments
+                .iter()
+                .find(|segment| segment.number() == *number);
             let has = segment.map_or(0, |segment| segment.rows().len() as u64);
             let name = |column: SegmentColumn| Some(format!("{number:04}.{}", column.extension()));
             if has < *runs {

@@ -129,7 +129,10 @@ impl StoredCampaigns {
         let Some(extent) = self.campaign_extent(id)? else {
             return Ok(None);
         };
-        let mut known = self.known_states.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut known = self
+            .known_states
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
         if let Some((of, state)) = known.get(id)
             && *of == extent.state
         {
@@ -156,7 +159,11 @@ impl StoredCampaigns {
             let (of, runs) = runs.get(id)?;
             (*of == extent).then(|| Arc::clone(runs))
         };
-        let lock = || self.known_runs.lock().unwrap_or_else(PoisonError::into_inner);
+        let lock = || {
+            self.known_runs
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+        };
         if let Some(runs) = known(&lock()) {
             return Ok(runs);
         }
@@ -179,7 +186,10 @@ impl StoredCampaigns {
         let extent = self.folder.campaign_extent(id)?.unwrap_or_default();
         let present = CampaignRuns::read(&self.folder, id, &extent)?;
         match present.shortened(&state.segments) {
-            Some(file) => Err(fault::shortened(&self.folder, &self.folder.campaign(id).join(file))),
+            Some(file) => Err(fault::shortened(
+                &self.folder,
+                &self.folder.campaign(id).join(file),
+            )),
             None => Ok(()),
         }
     }
@@ -241,7 +251,8 @@ impl StoredCampaigns {
                 let length = whole_length(&below, file)?;
                 below.append(file)?.set_len(length)
             };
-            cut().map_err(|error| fault::io(self.folder.dir(), "reopening the campaign", &error))?;
+            cut()
+                .map_err(|error| fault::io(self.folder.dir(), "reopening the campaign", &error))?;
         }
         Ok(())
     }

@@ -15,8 +15,7 @@ pub const FAILED_AGAIN: &str = "failed runs of ";
 /// The beginning of the table `case` in the text of a configuration, for each line.
 const CASE: &str = r"^[ \t]*(\[[ \t]*case[ \t]*(\]|\.)|case[ \t]*(\.|=))";
 
-static IS_CASE: LazyLock<Option<Regex>> =
-    LazyLock::new(|| Regex::new(&format!("(?m){CASE}")).ok());
+static IS_CASE: LazyLock<Option<Regex>> = LazyLock::new(|| Regex::new(&format!("(?m){CASE}")).ok());
 
 /// Returns the ids of the runs that count in rates over `runs`, which are sorted by time: of runs
 /// with bit-identical traces only the newest counts, because the others add no evidence.
@@ -111,7 +110,11 @@ impl History {
             };
             let is_selected = record.name.starts_with(FAILED_AGAIN)
                 || is_case()
-                || self.stored.runs_of(&record.id)?.iter().any(|run| run.row.is_shrunk);
+                || self
+                    .stored
+                    .runs_of(&record.id)?
+                    .iter()
+                    .any(|run| run.row.is_shrunk);
             if is_selected {
                 selected.insert(record.id.clone());
             }

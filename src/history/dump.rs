@@ -83,9 +83,13 @@ impl History {
         let (new, writer) = begin(file).map_err(failed)?;
         let mut writer = serializer(RdfSyntax::Turtle).for_writer(writer);
         self.each_statements(WithFacts::No, &mut |quads| {
-            let of_default = quads.iter().filter(|quad| quad.graph_name.is_default_graph());
+            let of_default = quads
+                .iter()
+                .filter(|quad| quad.graph_name.is_default_graph());
             of_default
-                .map(|quad| writer.serialize_triple(oxigraph::model::TripleRef::from(quad.as_ref())))
+                .map(|quad| {
+                    writer.serialize_triple(oxigraph::model::TripleRef::from(quad.as_ref()))
+                })
                 .collect::<io::Result<()>>()
                 .map_err(failed)
         })?;

@@ -71,13 +71,14 @@ impl History {
     pub fn write(&self, entry: &Entry) -> Result<(), Diagnostics> {
         let doing = format!("writing run {}", entry.run.id_in(&entry.campaign));
         let folder = &self.stored.folder;
-        self.segments.with_segment(folder, &entry.campaign, &doing, |segment| {
-            segment.append(&RunContent {
-                run: &entry.run,
-                states: &entry.states,
-                motion: entry.motion.as_deref(),
+        self.segments
+            .with_segment(folder, &entry.campaign, &doing, |segment| {
+                segment.append(&RunContent {
+                    run: &entry.run,
+                    states: &entry.states,
+                    motion: entry.motion.as_deref(),
+                })
             })
-        })
     }
 
     /// Encodes and stores a run, completely or (on an error) not at all.

@@ -86,7 +86,11 @@ pub(super) fn io(dir: &Path, doing: &str, error: &std::io::Error) -> Diagnostics
 pub(super) fn segment(folder: &Folder, file: &Path, fault: &ReadFault) -> Diagnostics {
     match fault {
         ReadFault::Io(error) if error.kind() == ErrorKind::NotFound => missing(folder, file),
-        ReadFault::Io(error) => io(folder.dir(), &format!("reading `{}`", file.display()), error),
+        ReadFault::Io(error) => io(
+            folder.dir(),
+            &format!("reading `{}`", file.display()),
+            error,
+        ),
         ReadFault::Damaged(fault) => {
             let file = folder.relative(file).display();
             damaged(folder.dir(), &format!("`{file}`: {fault}"))
@@ -133,7 +137,10 @@ pub(super) fn undecodable(
 
 /// H009: a file of a segment is missing.
 fn missing(folder: &Folder, file: &Path) -> Diagnostics {
-    let message = format!("values of runs can't be read: `{}` is missing", file.display());
+    let message = format!(
+        "values of runs can't be read: `{}` is missing",
+        file.display()
+    );
     Diagnostic::error("H009", message)
         .help(format!(
             "restore the file from a backup; the other files of the history `{}` are intact",

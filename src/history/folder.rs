@@ -210,7 +210,11 @@ impl Folder {
             let length = metadata.len();
             if column == SegmentColumn::Campaign {
                 has_state = true;
-                extent.state = [length, metadata.ino(), metadata.mtime_nsec().cast_unsigned()];
+                extent.state = [
+                    length,
+                    metadata.ino(),
+                    metadata.mtime_nsec().cast_unsigned(),
+                ];
                 continue;
             }
             let segment = extent.segments.entry(number).or_default();

@@ -271,8 +271,8 @@ impl History {
         let detail = self.stored.with_run(&id, |campaign, run| {
             let stored = run.segment.run(run.row);
             let details = SegmentColumn::Details;
-            let stored =
-                stored.map_err(|fault| fault::run(&self.stored.folder, &id, run, details, &fault))?;
+            let stored = stored
+                .map_err(|fault| fault::run(&self.stored.folder, &id, run, details, &fault))?;
             Ok(stored.detail(campaign))
         })?;
         detail.ok_or_else(|| fault::no_run(self.dir(), &id))

@@ -54,7 +54,9 @@ impl History {
         found
             .damage
             .sort_by(|one, other| (&one.file, &one.run).cmp(&(&other.file, &other.run)));
-        found.damage.dedup_by(|one, other| (&one.file, &one.run) == (&other.file, &other.run));
+        found
+            .damage
+            .dedup_by(|one, other| (&one.file, &one.run) == (&other.file, &other.run));
         if found.damage.is_empty() {
             return Ok((found, history));
         }
@@ -84,9 +86,8 @@ impl History {
         let mut runs = CampaignRuns::default();
         id.clone_into(&mut runs.id);
         for (number, lengths) in &extent.segments {
-            let file = |column: SegmentColumn| {
-                folder.join(format!("{number:04}.{}", column.extension()))
-            };
+            let file =
+                |column: SegmentColumn| folder.join(format!("{number:04}.{}", column.extension()));
             if let Some(length) = lengths.runs {
                 match Segment::open(&below, &folder, *number, length) {
                     Ok(segment) => {

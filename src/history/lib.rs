@@ -52,6 +52,7 @@ pub use answer::{Cancel, QueryAnswer};
 pub use counted::{FAILED_AGAIN, newest_of_alike, without_counts};
 pub use entry::Entry;
 pub use foreign::{ForeignAnswer, check_query};
+pub use history::History;
 pub use integrity::{Damage, Integrity};
 pub use judged::{JudgedOutcome, JudgedRun, Judgements, LaterRules, Wish};
 pub use newest::NewestOutcomes;
@@ -64,7 +65,6 @@ pub use record::{
 pub use restore::Restore;
 pub use rows::{ActionDetail, CampaignRow, ObjectDetail, OutcomeRow, RunDetail, RunFilter, RunRow};
 pub use scene_digest::SceneDigest;
-pub use history::History;
 pub use vitals::RunVitals;
 pub use wire::{WireFault, WireLimits, WireSyntax};
 pub use write_scene::{NOISE_TERMS, noise};

@@ -2,12 +2,12 @@
 
 use oxigraph::model::{GraphName, NamedNode, NamedOrBlankNode, Quad, Term};
 
+use crate::History;
 use crate::history::run_id;
 use crate::statements::Statements;
 use crate::view::{Demand, StatementMaker, WithFacts};
 use crate::write_campaign::{self, campaign_node};
 use crate::write_run::run_node;
-use crate::History;
 use actcheck_base::{Diagnostics, names};
 
 /// The statements about one campaign or run.

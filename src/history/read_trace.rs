@@ -85,7 +85,9 @@ impl History {
     }
 
     fn recorded_of(&self, id: &str) -> Result<(Vec<Choice>, Trace), Diagnostics> {
-        let recorded = self.stored.with_run(id, |_, run| self.recorded_at(id, run))?;
+        let recorded = self
+            .stored
+            .with_run(id, |_, run| self.recorded_at(id, run))?;
         recorded.ok_or_else(|| fault::no_run(self.dir(), id))
     }
 
@@ -100,7 +102,13 @@ impl History {
             .map_err(|why| self.undecodable(id, run, SegmentColumn::States, &why))?;
         if recorded.1.hash != run.row.trace_hash() {
             let why = "these are the states of another run";
-            return Err(fault::undecodable(&self.stored.folder, id, run, SegmentColumn::States, why));
+            return Err(fault::undecodable(
+                &self.stored.folder,
+                id,
+                run,
+                SegmentColumn::States,
+                why,
+            ));
         }
         Ok(recorded)
     }
@@ -139,9 +147,8 @@ impl History {
         // With the precision of stored motion.
         let (_, mut trace) = self.recorded_of(id)?;
         let again = encode_motion(&simulated).and_then(|motion| add(motion, &mut trace));
-        let unencodable = |why: CodecFault| {
-            fault::damaged(self.dir(), &format!("the motion of run {id}: {why}"))
-        };
+        let unencodable =
+            |why: CodecFault| fault::damaged(self.dir(), &format!("the motion of run {id}: {why}"));
         again.map_err(unencodable)?;
         Ok(Some(trace))
     }

@@ -82,7 +82,13 @@ impl<'h> NewestJudgements<'h> {
         });
         if is_judged {
             let stored = at.segment.run(at.row).map_err(|why| {
-                fault::run(&self.history.stored.folder, run, at, SegmentColumn::Details, &why)
+                fault::run(
+                    &self.history.stored.folder,
+                    run,
+                    at,
+                    SegmentColumn::Details,
+                    &why,
+                )
             })?;
             let action = stored.actions.into_iter().nth(step as usize - 1);
             for judgement in action.into_iter().flat_map(|action| action.judgements) {
@@ -100,7 +106,9 @@ impl<'h> NewestJudgements<'h> {
             }
         }
         let stored = newest.into_values();
-        Ok(stored.map(|judgement| StoredJudgement { judgement }).collect())
+        Ok(stored
+            .map(|judgement| StoredJudgement { judgement })
+            .collect())
     }
 
     fn campaign(&self, id: &str) -> Result<Arc<CampaignRuns>, Diagnostics> {
@@ -190,12 +198,15 @@ impl History {
             let Some((campaign, index)) = place_of(&recheck.run) else {
                 continue;
             };
-            of_campaigns.entry(campaign).or_default().push(LaterJudgement {
-                index,
-                step: recheck.step,
-                at: at.to_owned(),
-                judgement: recheck.now.clone(),
-            });
+            of_campaigns
+                .entry(campaign)
+                .or_default()
+                .push(LaterJudgement {
+                    index,
+                    step: recheck.step,
+                    at: at.to_owned(),
+                    judgement: recheck.now.clone(),
+                });
         }
         of_campaigns
             .into_iter()

@@ -29,7 +29,9 @@ impl History {
         let Some((choices, trace)) = restore(self, run)? else {
             return Ok(None);
         };
-        let recorded = self.stored.with_run(run, |_, run| Ok(run.row.trace_hash()))?;
+        let recorded = self
+            .stored
+            .with_run(run, |_, run| Ok(run.row.trace_hash()))?;
         let recorded = recorded.unwrap_or_default();
         if trace.hash != recorded {
             let why = format!("its states have the digest {}, not {recorded}", trace.hash);

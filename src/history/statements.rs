@@ -120,10 +120,7 @@ impl<'d> Statements<'d> {
     }
 
     /// Starts statements about a subject.
-    pub(super) fn about<'s>(
-        &'s mut self,
-        subject: impl Into<NamedOrBlankNode>,
-    ) -> About<'s, 'd> {
+    pub(super) fn about<'s>(&'s mut self, subject: impl Into<NamedOrBlankNode>) -> About<'s, 'd> {
         About {
             statements: self,
             subject: subject.into(),
@@ -163,7 +160,12 @@ impl About<'_, '_> {
             let value = value.into().into_term();
             let graph = statements.graph.as_ref().map(NamedNode::as_str);
             let demand = statements.demand;
-            if demand.has(self.subject.as_ref(), property.as_str(), value.as_ref(), graph) {
+            if demand.has(
+                self.subject.as_ref(),
+                property.as_str(),
+                value.as_ref(),
+                graph,
+            ) {
                 let graph = statements.graph.clone();
                 statements.quads.push(Quad {
                     subject: self.subject.clone(),

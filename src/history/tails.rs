@@ -41,7 +41,9 @@ impl History {
     /// A file is damaged or can't be read.
     pub fn tail_warning(&self) -> Result<Option<Diagnostic>, Diagnostics> {
         // Another process may be writing.
-        if self.stored.is_salvaged() || (!self.stored.folder.is_own() && self.stored.folder.is_locked()) {
+        if self.stored.is_salvaged()
+            || (!self.stored.folder.is_own() && self.stored.folder.is_locked())
+        {
             return Ok(None);
         }
         for state in self.stored.states()? {
@@ -94,7 +96,10 @@ impl History {
 
     /// The ends of a campaign's segments that are not as a finished process leaves them.
     pub(crate) fn torn_tails(&self, runs: &CampaignRuns) -> Result<Vec<TornTail>, Diagnostics> {
-        let (below, folder) = (self.stored.folder.below(), self.stored.folder.campaign(&runs.id));
+        let (below, folder) = (
+            self.stored.folder.below(),
+            self.stored.folder.campaign(&runs.id),
+        );
         let mut tails: Vec<TornTail> = runs
             .torn
             .iter()
@@ -104,7 +109,11 @@ impl History {
                 without_row: Vec::new(),
             })
             .collect();
-        let extent = self.stored.folder.campaign_extent(&runs.id)?.unwrap_or_default();
+        let extent = self
+            .stored
+            .folder
+            .campaign_extent(&runs.id)?
+            .unwrap_or_default();
         for number in extent.segments.keys() {
             let segment = runs.segments.iter().find(|own| own.number() == *number);
             let end = segment

@@ -75,7 +75,9 @@ impl History {
         let (mut count, mut secs) = (0, 0.0);
         for row in runs {
             let of_campaign = self.stored.runs_of(&row.campaign)?;
-            let run = of_campaign.find(row.index).filter(|run| !run.row.is_whole());
+            let run = of_campaign
+                .find(row.index)
+                .filter(|run| !run.row.is_whole());
             if let Some(run) = run {
                 count += 1;
                 secs += run.row.wall_secs;

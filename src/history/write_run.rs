@@ -95,14 +95,8 @@ fn write_run(stored: &StoredRun, campaign: &str, run: &NamedNode, statements: &m
         .has("act:status", stored.status.word())
         .has("act:traceHash", stored.trace_hash.as_str())
         .has("act:discards", stored.discards.len() as u64)
-        .optional(
-            "act:reason",
-            stored.reason.as_deref(),
-        )
-        .optional(
-            "act:programOutput",
-            stored.program_output.as_deref(),
-        )
+        .optional("act:reason", stored.reason.as_deref())
+        .optional("act:programOutput", stored.program_output.as_deref())
         .optional(
             "act:shrunkFrom",
             stored.shrunk_from.as_deref().map(run_node),
@@ -159,7 +153,12 @@ fn write_designators(
     }
 }
 
-fn write_execution(stored: &StoredRun, step: usize, run: &NamedNode, statements: &mut Statements<'_>) {
+fn write_execution(
+    stored: &StoredRun,
+    step: usize,
+    run: &NamedNode,
+    statements: &mut Statements<'_>,
+) {
     let action = &stored.actions[step];
     let node = below(run, &(step + 1).to_string());
     let mut about = statements.about(node.clone());

@@ -9,9 +9,7 @@ use crate::campaign_state::CampaignState;
 use crate::history::{place_of, run_id};
 use crate::merge::plan::{MergePlan, PlannedEnd, PlannedMerge};
 use crate::merge::survey::identity;
-use crate::segment::{
-    LaterJudgement, RunContent, Segment, SegmentColumn, copy_column,
-};
+use crate::segment::{LaterJudgement, RunContent, Segment, SegmentColumn, copy_column};
 use crate::writers::next_segment;
 use crate::{FAILED_AGAIN, History, fault};
 use actcheck_base::Diagnostics;
@@ -41,7 +39,11 @@ pub fn carry_out(
 ) -> Result<Merged, Diagnostics> {
     let new_ids = (0..sources.len()).map(|source| {
         let of_source = plan.ids.iter().filter(|((of, _), _)| *of == source);
-        NewIds(of_source.map(|((_, old), new)| (old.clone(), new.clone())).collect())
+        NewIds(
+            of_source
+                .map(|((_, old), new)| (old.clone(), new.clone()))
+                .collect(),
+        )
     });
     let mut writer = Writer {
         sources,
@@ -198,7 +200,10 @@ impl Writer<'_> {
         if history.stored.is_salvaged() || segment.rows().is_empty() || is_shrunk() || has_twice() {
             return Ok(false);
         }
-        let (from, to) = (history.stored.folder.below(), self.into.stored.folder.below());
+        let (from, to) = (
+            history.stored.folder.below(),
+            self.into.stored.folder.below(),
+        );
         let folder = self.into.stored.folder.campaign(&campaign.id);
         let number = next_segment(&self.into.stored.folder, &campaign.id)?;
         let unwritten = |error| fault::io(self.into.dir(), "writing merged data", &error);
@@ -256,13 +261,15 @@ impl Writer<'_> {
             .map_err(unread(SegmentColumn::Motion))?;
         let doing = format!("writing run {}", run_id(&campaign.id, index));
         let into = &self.into.stored.folder;
-        self.into.segments.with_segment(into, &campaign.id, &doing, |segment| {
-            segment.append(&RunContent {
-                run: &stored,
-                states: &states,
-                motion: motion.as_deref(),
-            })
-        })?;
+        self.into
+            .segments
+            .with_segment(into, &campaign.id, &doing, |segment| {
+                segment.append(&RunContent {
+                    run: &stored,
+                    states: &states,
+                    motion: motion.as_deref(),
+                })
+            })?;
         self.merged.runs += 1;
         Ok(())
     }
@@ -283,7 +290,9 @@ impl Writer<'_> {
             let runs = self.sources[origin.0].stored.runs_of(&origin.1)?;
             let is_new = |later: &&LaterJudgement| {
                 let of_run = [&work.runs, &work.judgements];
-                of_run.iter().any(|runs| runs.get(&later.index) == Some(origin))
+                of_run
+                    .iter()
+                    .any(|runs| runs.get(&later.index) == Some(origin))
                     && !known.contains(&(later.index, identity(later)))
             };
             let new: Vec<LaterJudgement> = runs.later.iter().filter(is_new).cloned().collect();

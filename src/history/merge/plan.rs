@@ -4,9 +4,9 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::campaign_state::CampaignState;
+use crate::history::campaign_id;
 use crate::merge::conflict;
 use crate::merge::survey::{Found, FoundRun, survey};
-use crate::history::campaign_id;
 use crate::{CampaignEnd, History, RunStatus};
 use actcheck_base::{Diagnostic, Diagnostics, Outcome, Shard, did_you_mean};
 use actcheck_verdict::{Counts, mean};

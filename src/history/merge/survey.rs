@@ -148,7 +148,11 @@ pub(super) fn identity(later: &LaterJudgement) -> String {
 fn content(run: RunAt<'_>) -> String {
     let RunAt { segment, row } = run;
     let mut digest = Digest::new();
-    for text in [&*segment.text(row.test), row.status.word(), &row.trace_hash()] {
+    for text in [
+        &*segment.text(row.test),
+        row.status.word(),
+        &row.trace_hash(),
+    ] {
         digest.update(text.as_bytes());
     }
     digest.update(&row.score.to_bits().to_le_bytes());
@@ -162,7 +166,11 @@ fn content(run: RunAt<'_>) -> String {
         digest.update(&action.to_le_bytes());
         let number = row.actions.get(action as usize).copied().flatten();
         let action = number.map(|number| segment.text(number));
-        for text in [action.as_deref().unwrap_or_default(), &*property, own.outcome.word()] {
+        for text in [
+            action.as_deref().unwrap_or_default(),
+            &*property,
+            own.outcome.word(),
+        ] {
             digest.update(text.as_bytes());
         }
         digest.update(&own.margin.map_or(0, f64::to_bits).to_le_bytes());

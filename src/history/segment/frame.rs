@@ -378,7 +378,10 @@ mod tests {
     fn frames_after_a_damaged_one_are_found() {
         let (bytes, places) = file();
         let found = |bytes: &[u8]| -> Vec<FramePlace> {
-            whole_frames(bytes).iter().map(|(place, _)| *place).collect()
+            whole_frames(bytes)
+                .iter()
+                .map(|(place, _)| *place)
+                .collect()
         };
         assert_eq!(found(&bytes), places);
         for at in HEAD..bytes.len() {

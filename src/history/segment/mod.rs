@@ -10,12 +10,8 @@ mod reader;
 mod row;
 mod writer;
 
-pub(crate) use frame::{
-    FrameFault, Frames, HEAD, ReadFault, SegmentColumn, put, whole_frames,
-};
-pub(crate) use judgements::{
-    JudgementWriter, LaterJudgement, read_judgements, salvage_judgements,
-};
+pub(crate) use frame::{FrameFault, Frames, HEAD, ReadFault, SegmentColumn, put, whole_frames};
+pub(crate) use judgements::{JudgementWriter, LaterJudgement, read_judgements, salvage_judgements};
 pub(crate) use packed::{packed, unpacked};
 pub(crate) use reader::{Segment, indices_after, whole_length};
 pub(crate) use row::RunEntry;
@@ -135,7 +131,11 @@ mod tests {
                 let (segment, lost) = salvaged.expect("it can be read").expect("it has runs");
                 let is_rebuilt = [SegmentColumn::Runs, SegmentColumn::Motion].contains(&column);
                 assert_eq!(segment.rows().len() + lost.len(), 4, "byte {at}");
-                assert!(lost.is_empty() || !is_rebuilt, "byte {at} of {}", file.display());
+                assert!(
+                    lost.is_empty() || !is_rebuilt,
+                    "byte {at} of {}",
+                    file.display()
+                );
             }
             std::fs::write(&file, whole).expect("it can be written");
         }

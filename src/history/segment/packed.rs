@@ -257,7 +257,9 @@ impl ColumnReader {
     fn key_content(&self, offset: u64) -> Result<Vec<u8>, ReadFault> {
         let fault = || ReadFault::from(FrameFault::Content(offset));
         let mut head = [0; FRAME_HEADER];
-        self.file.read_exact_at(&mut head, offset).map_err(|error| cut(error, offset))?;
+        self.file
+            .read_exact_at(&mut head, offset)
+            .map_err(|error| cut(error, offset))?;
         let bytes = self.content(place_of(offset, head)?)?;
         let frame = PackedFrame::parse(&bytes).filter(|frame| frame.back == 0);
         let frame = frame.ok_or_else(fault)?;

@@ -94,7 +94,10 @@ impl Segment {
         folder: &Path,
         number: u32,
     ) -> Result<Option<(Self, BTreeSet<u64>)>, ReadFault> {
-        if below.kind(&path(folder, number, SegmentColumn::Details)).is_none() {
+        if below
+            .kind(&path(folder, number, SegmentColumn::Details))
+            .is_none()
+        {
             return Ok(None);
         }
         let readable = |column| readable_frames(below, folder, number, column);
@@ -265,8 +268,15 @@ impl Segment {
         let mut texts = TextTable::default();
         let again = RunEntry::of(stored, row.places, &mut texts);
         let texts_of = |row: &RunEntry, texts: &TextTable| {
-            let actions = row.actions.iter().flatten().map(|number| texts.text(*number));
-            let properties = row.outcomes.iter().map(|outcome| texts.text(outcome.property));
+            let actions = row
+                .actions
+                .iter()
+                .flatten()
+                .map(|number| texts.text(*number));
+            let properties = row
+                .outcomes
+                .iter()
+                .map(|outcome| texts.text(outcome.property));
             let texts: Vec<Arc<str>> = actions.chain(properties).collect();
             texts
         };
@@ -275,11 +285,15 @@ impl Segment {
             && texts_of(row, &self.texts) == texts_of(&again, &texts)
             && row.scene() == again.scene()
             && row.outcomes.len() == again.outcomes.len()
-            && row.outcomes.iter().zip(&again.outcomes).all(|(one, other)| {
-                one.action == other.action
-                    && one.outcome == other.outcome
-                    && one.margin.map(f64::to_bits) == other.margin.map(f64::to_bits)
-            })
+            && row
+                .outcomes
+                .iter()
+                .zip(&again.outcomes)
+                .all(|(one, other)| {
+                    one.action == other.action
+                        && one.outcome == other.outcome
+                        && one.margin.map(f64::to_bits) == other.margin.map(f64::to_bits)
+                })
     }
 }
 

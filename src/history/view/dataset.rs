@@ -134,7 +134,7 @@ impl Dataset {
     fn internal(&self, term: ExpressionTerm) -> DatasetTerm {
         match self.terms.find(&Parts::of_expression(&term)) {
             Some(number) => DatasetTerm::Known(TermNumber(number)),
-            None => DatasetTerm::Created(Rc::new(Value(term))),
+            None => DatasetTerm::Created(Rc::new(LiteralValue(term))),
         }
     }
 }
@@ -144,7 +144,7 @@ impl Dataset {
 pub(crate) enum DatasetTerm {
     Known(TermNumber),
     /// Never equal to a term of the dataset.
-    Created(Rc<Value>),
+    Created(Rc<LiteralValue>),
 }
 
 impl DatasetTerm {
@@ -173,9 +173,9 @@ impl<'a> QueryableDataset<'a> for &'a Dataset {
         let [s, p, o, g] = numbers;
         let created = parts.iter().flatten().any(|part| part.number().is_none());
         let found = match graph_name {
-            _ if created => Found::Nothing,
-            Some(None) => Found::Default(dataset.default.find(s, p, o)),
-            Some(Some(_)) | None => Found::Named(dataset.named.find(g, s, p, o)),
+            _ if created => FoundRows::Nothing,
+            Some(None) => FoundRows::Default(dataset.default.find(s, p, o)),
+            Some(Some(_)) | None => FoundRows::Named(dataset.named.find(g, s, p, o)),
         };
         found.map(|row| {
             let known = |number| DatasetTerm::Known(TermNumber(number));
@@ -204,7 +204,7 @@ impl<'a> QueryableDataset<'a> for &'a Dataset {
     fn internalize_term(&self, term: Term) -> Result<DatasetTerm, Infallible> {
         Ok(match self.terms.find(&Parts::of_term(term.as_ref())) {
             Some(number) => DatasetTerm::Known(TermNumber(number)),
-            None => DatasetTerm::Created(Rc::new(Value(term.into()))),
+            None => DatasetTerm::Created(Rc::new(LiteralValue(term.into()))),
         })
     }
 
@@ -246,15 +246,15 @@ impl<'a> QueryableDataset<'a> for &'a Dataset {
 /// A term as the evaluator computes with it. Equality is identity: `1` and `1.0`, and one moment
 /// in two time zones, are different.
 #[derive(Clone)]
-pub(crate) struct Value(ExpressionTerm);
+pub(crate) struct LiteralValue(ExpressionTerm);
 
-impl fmt::Debug for Value {
+impl fmt::Debug for LiteralValue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Debug::fmt(&Term::from(self.0.clone()), f)
     }
 }
 
-impl PartialEq for Value {
+impl PartialEq for LiteralValue {
     fn eq(&self, other: &Self) -> bool {
         use ExpressionTerm as E;
         match (&self.0, &other.0) {
@@ -271,9 +271,9 @@ impl PartialEq for Value {
     }
 }
 
-impl Eq for Value {}
+impl Eq for LiteralValue {}
 
-impl Hash for Value {
+impl Hash for LiteralValue {
     fn hash<H: Hasher>(&self, state: &mut H) {
         self.0.hash(state);
     }
@@ -362,7 +362,7 @@ enum Parts<'t> {
     Text(TextKind<'t>, &'t str),
     /// A value of at most 64 bits.
     Bits(Form, u64),
-    Value(Value),
+    LiteralValue(LiteralValue),
 }
 
 impl<'t> Parts<'t> {
@@ -408,7 +408,7 @@ impl<'t> Parts<'t> {
             ExpressionTerm::DoubleLiteral(value) => {
                 Self::Bits(Form::DOUBLE, f64::from(*value).to_bits())
             }
-            other => Self::Value(Value(other.clone())),
+            other => Self::LiteralValue(LiteralValue(other.clone())),
         }
     }
 
@@ -432,15 +432,15 @@ impl<'t> Parts<'t> {
 
 /// Parts with the language or datatype by number.
 #[derive(Debug)]
-enum Key<'t> {
+enum LookupKey<'t> {
     Text(Form, &'t str),
     Bits(Form, u64),
-    Value(&'t Value),
+    LiteralValue(&'t LiteralValue),
 }
 
 /// The content of one term.
 #[derive(Debug, Clone, Copy)]
-struct Entry {
+struct TermEntry {
     /// Start of the text, the bits of the value, or the index of the value.
     place: u64,
     /// Length of the text. Unit: bytes.
@@ -451,12 +451,12 @@ struct Entry {
 /// A term in the hash table, with a part of its hash, so that most comparisons and all moves to a
 /// larger table leave the text alone.
 #[derive(Debug, Clone, Copy)]
-struct Slot {
+struct HashSlot {
     number: u32,
     hash: u32,
 }
 
-impl Slot {
+impl HashSlot {
     /// The hash as the table wants it: different in its first and in its last bits.
     fn wide(hash: u32) -> u64 {
         u64::from(hash) << 32 | u64::from(hash)
@@ -466,38 +466,38 @@ impl Slot {
 /// The interner of terms.
 #[derive(Debug, Default, Clone)]
 struct Terms {
-    entries: Vec<Entry>,
+    entries: Vec<TermEntry>,
     /// The texts of all terms, one after another.
     text: String,
-    values: Vec<Value>,
+    values: Vec<LiteralValue>,
     suffixes: Vec<Suffix>,
     languages: HashMap<Box<str>, Form, RandomState>,
     datatypes: HashMap<Box<str>, Form, RandomState>,
-    slots: HashTable<Slot>,
+    slots: HashTable<HashSlot>,
     hasher: RandomState,
 }
 
 impl Terms {
     fn find(&self, parts: &Parts<'_>) -> Option<u32> {
         let key = match parts {
-            Parts::Text(TextKind::Form(form), text) => Key::Text(*form, text),
+            Parts::Text(TextKind::Form(form), text) => LookupKey::Text(*form, text),
             Parts::Text(TextKind::Language(tag), text) => {
-                Key::Text(*self.languages.get(*tag)?, text)
+                LookupKey::Text(*self.languages.get(*tag)?, text)
             }
             Parts::Text(TextKind::Datatype(iri), text) => {
-                Key::Text(*self.datatypes.get(*iri)?, text)
+                LookupKey::Text(*self.datatypes.get(*iri)?, text)
             }
-            Parts::Bits(form, bits) => Key::Bits(*form, *bits),
-            Parts::Value(value) => Key::Value(value),
+            Parts::Bits(form, bits) => LookupKey::Bits(*form, *bits),
+            Parts::LiteralValue(value) => LookupKey::LiteralValue(value),
         };
         self.find_key(&key, self.hash(&key))
     }
 
     fn intern(&mut self, parts: &Parts<'_>) -> u32 {
         let key = match parts {
-            Parts::Text(kind, text) => Key::Text(self.intern_form(*kind), text),
-            Parts::Bits(form, bits) => Key::Bits(*form, *bits),
-            Parts::Value(value) => Key::Value(value),
+            Parts::Text(kind, text) => LookupKey::Text(self.intern_form(*kind), text),
+            Parts::Bits(form, bits) => LookupKey::Bits(*form, *bits),
+            Parts::LiteralValue(value) => LookupKey::LiteralValue(value),
         };
         let hash = self.hash(&key);
         match self.find_key(&key, hash) {
@@ -525,61 +525,63 @@ impl Terms {
         form
     }
 
-    fn hash(&self, key: &Key<'_>) -> u32 {
+    fn hash(&self, key: &LookupKey<'_>) -> u32 {
         let mut hasher = self.hasher.build_hasher();
         match key {
-            Key::Text(form, text) => {
+            LookupKey::Text(form, text) => {
                 hasher.write_u32(form.0);
                 hasher.write(text.as_bytes());
             }
-            Key::Bits(form, bits) => {
+            LookupKey::Bits(form, bits) => {
                 hasher.write_u32(form.0);
                 hasher.write_u64(*bits);
             }
-            Key::Value(value) => value.hash(&mut hasher),
+            LookupKey::LiteralValue(value) => value.hash(&mut hasher),
         }
         let hash = hasher.finish();
         // Both halves have good bits; the table needs only one of them.
         (hash ^ (hash >> 32)) as u32
     }
 
-    fn find_key(&self, key: &Key<'_>, hash: u32) -> Option<u32> {
-        let is_it = |slot: &Slot| slot.hash == hash && self.is(slot.number, key);
+    fn find_key(&self, key: &LookupKey<'_>, hash: u32) -> Option<u32> {
+        let is_it = |slot: &HashSlot| slot.hash == hash && self.is(slot.number, key);
         self.slots
-            .find(Slot::wide(hash), is_it)
+            .find(HashSlot::wide(hash), is_it)
             .map(|slot| slot.number)
     }
 
-    fn is(&self, number: u32, key: &Key<'_>) -> bool {
+    fn is(&self, number: u32, key: &LookupKey<'_>) -> bool {
         let entry = self.entry(number);
         match key {
-            Key::Text(form, text) => entry.form == *form && self.text_of(entry) == *text,
-            Key::Bits(form, bits) => entry.form == *form && entry.place == *bits,
-            Key::Value(value) => entry.form == Form::VALUE && self.value_of(entry) == *value,
+            LookupKey::Text(form, text) => entry.form == *form && self.text_of(entry) == *text,
+            LookupKey::Bits(form, bits) => entry.form == *form && entry.place == *bits,
+            LookupKey::LiteralValue(value) => {
+                entry.form == Form::VALUE && self.value_of(entry) == *value
+            }
         }
     }
 
-    fn add(&mut self, key: &Key<'_>, hash: u32) -> u32 {
+    fn add(&mut self, key: &LookupKey<'_>, hash: u32) -> u32 {
         let number = narrow(self.entries.len());
         let entry = match key {
-            Key::Text(form, text) => {
+            LookupKey::Text(form, text) => {
                 let place = self.text.len() as u64;
                 self.text.push_str(text);
-                Entry {
+                TermEntry {
                     place,
                     length: narrow(text.len()),
                     form: *form,
                 }
             }
-            Key::Bits(form, bits) => Entry {
+            LookupKey::Bits(form, bits) => TermEntry {
                 place: *bits,
                 length: 0,
                 form: *form,
             },
-            Key::Value(value) => {
+            LookupKey::LiteralValue(value) => {
                 let place = self.values.len() as u64;
                 self.values.push((*value).clone());
-                Entry {
+                TermEntry {
                     place,
                     length: 0,
                     form: Form::VALUE,
@@ -588,22 +590,22 @@ impl Terms {
         };
         self.entries.push(entry);
         self.slots
-            .insert_unique(Slot::wide(hash), Slot { number, hash }, |slot| {
-                Slot::wide(slot.hash)
+            .insert_unique(HashSlot::wide(hash), HashSlot { number, hash }, |slot| {
+                HashSlot::wide(slot.hash)
             });
         number
     }
 
-    fn entry(&self, number: u32) -> Entry {
+    fn entry(&self, number: u32) -> TermEntry {
         self.entries[number as usize]
     }
 
-    fn text_of(&self, entry: Entry) -> &str {
+    fn text_of(&self, entry: TermEntry) -> &str {
         let start = entry.place as usize;
         &self.text[start..start + entry.length as usize]
     }
 
-    fn value_of(&self, entry: Entry) -> &Value {
+    fn value_of(&self, entry: TermEntry) -> &LiteralValue {
         &self.values[entry.place as usize]
     }
 
@@ -880,13 +882,13 @@ struct FoundQuads<'a> {
 
 /// The statements that match a pattern.
 #[derive(Debug)]
-enum Found<'a> {
+enum FoundRows<'a> {
     Nothing,
     Default(FoundTriples<'a>),
     Named(FoundQuads<'a>),
 }
 
-impl Iterator for Found<'_> {
+impl Iterator for FoundRows<'_> {
     type Item = Row;
 
     fn next(&mut self) -> Option<Row> {

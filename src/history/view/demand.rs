@@ -174,7 +174,10 @@ impl Demand {
             InGraph::Is(name) => is_below(name, run),
         };
         self.graphs.iter().any(is_of_run)
-            || self.patterns.iter().any(|pattern| is_of_run(&pattern.graph))
+            || self
+                .patterns
+                .iter()
+                .any(|pattern| is_of_run(&pattern.graph))
     }
 
     /// Whether the name of a graph is needed.

@@ -148,13 +148,15 @@ impl View {
         let states = source.stored.states()?;
         let is_changed = |state: &Arc<CampaignState>| {
             let known = self.taken.get(&state.record.id);
-            known.and_then(|taken| taken.state.as_ref()).is_some_and(|before| {
-                // An end that is added leaves the other statements as they are.
-                let mut grown = (**before).clone();
-                grown.end = grown.end.or_else(|| state.end.clone());
-                grown.segments = state.segments.clone();
-                grown != **state
-            })
+            known
+                .and_then(|taken| taken.state.as_ref())
+                .is_some_and(|before| {
+                    // An end that is added leaves the other statements as they are.
+                    let mut grown = (**before).clone();
+                    grown.end = grown.end.or_else(|| state.end.clone());
+                    grown.segments = state.segments.clone();
+                    grown != **state
+                })
         };
         if states.iter().any(is_changed) {
             let demand = std::mem::take(&mut self.demand);
@@ -411,7 +413,12 @@ impl<'s> StatementMaker<'s> {
                 last = Some(graph.clone());
             }
             let (subject, property) = (quad.subject.as_ref(), quad.predicate.as_str());
-            if demand.has(subject, property, quad.object.as_ref(), Some(graph.as_str())) {
+            if demand.has(
+                subject,
+                property,
+                quad.object.as_ref(),
+                Some(graph.as_str()),
+            ) {
                 made.quads.push(quad);
             }
         }
