@@ -656,7 +656,8 @@ impl Terms {
 
 /// Returns a count as the 32 bits that the rows and entries hold.
 fn narrow(count: usize) -> u32 {
-    u32::try_from(count).expect("the dataset is smaller than 2^32 terms, statements and bytes")
+    // A view is limited to far fewer terms, statements and bytes.
+    u32::try_from(count).unwrap_or(u32::MAX)
 }
 
 /// Rows of numbers in ascending order, found by their first number.
