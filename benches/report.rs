@@ -141,7 +141,7 @@ fn simulated(folder: &Path) -> Vec<(RunDetail, Trace)> {
     let runs = history
         .runs(&actcheck::history::RunFilter::default())
         .expect("it can be read");
-    let read = |id: &str| Some((history.run(id).ok()?, history.trace(id).ok()?));
+    let read = |id: &str| Some((history.run(id).ok()?, history.traces().whole(id).ok()?));
     runs.iter().filter_map(|row| read(&row.run)).collect()
 }
 

@@ -261,7 +261,7 @@ fn a_campaign_with_a_cabinet_knows_its_parts() {
     );
     // The trace keeps them, too.
     let history = History::open_to_read(&folder.path().join(".actcheck")).unwrap();
-    let trace = history.states("@last").unwrap();
+    let trace = history.traces().states("@last").unwrap();
     let parts = trace.snapshots.iter().map(|state| {
         let parts = state.bodies.iter().filter_map(|body| body.part.as_ref());
         parts.filter(|(whole, _)| whole == "cabinet_1").count()

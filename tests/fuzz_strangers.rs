@@ -521,7 +521,7 @@ fn merge(theirs: &Path, ours: &Path) -> Result<(), Diagnostics> {
     for run in into.runs(&RunFilter::default())? {
         into.run(&run.run)?;
         // A damaged trace is refused.
-        let _ = into.trace(&run.run).map_err(|found| show(&found));
+        let _ = into.traces().whole(&run.run).map_err(|found| show(&found));
     }
     Ok(())
 }

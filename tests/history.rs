@@ -276,9 +276,9 @@ fn a_stored_run_keeps_its_facts_trace_and_choices() {
     let record = sample_run("z2", 3);
     drop(history);
     let history = History::open_existing(&folder.path().join("history")).unwrap();
-    assert_eq!(history.trace("z2-4").unwrap(), record.trace);
-    assert_eq!(history.choices("z2-4").unwrap(), record.choices);
-    let facts = history.facts("z2-4", false).unwrap();
+    assert_eq!(history.traces().whole("z2-4").unwrap(), record.trace);
+    assert_eq!(history.traces().choices("z2-4").unwrap(), record.choices);
+    let facts = history.traces().facts("z2-4", false).unwrap();
     assert_eq!(
         (&facts.snapshots, &facts.during),
         (&record.facts.snapshots, &record.facts.during)
@@ -342,8 +342,8 @@ fn a_stored_run_keeps_parts_departures_and_suction_cups() {
     history.commit(&record).unwrap();
     drop(history);
     let history = History::open_existing(&folder.path().join("history")).unwrap();
-    assert_eq!(history.trace("z2-4").unwrap(), record.trace);
-    let facts = history.facts("z2-4", false).unwrap();
+    assert_eq!(history.traces().whole("z2-4").unwrap(), record.trace);
+    let facts = history.traces().facts("z2-4", false).unwrap();
     assert_eq!(facts_as_terms(&facts), facts_as_terms(&record.facts));
     let named = |local: &str| Term::iri(names::w(local));
     let has = |local: &str| {
@@ -943,15 +943,20 @@ fn damaged_or_missing_states_are_reported_and_other_data_is_readable() {
     let history = History::open_to_read(&dir).unwrap();
     assert!(
         history
-            .trace("z2-1")
+            .traces()
+            .whole("z2-1")
             .unwrap_err()
             .to_string()
             .starts_with("H007")
     );
-    assert_eq!(history.trace("z2-2").unwrap(), sample_trace(1));
+    assert_eq!(history.traces().whole("z2-2").unwrap(), sample_trace(1));
     std::fs::remove_file(&file).unwrap();
     let history = History::open_to_read(&dir).unwrap();
-    let fault = history.facts("z2-1", false).unwrap_err().to_string();
+    let fault = history
+        .traces()
+        .facts("z2-1", false)
+        .unwrap_err()
+        .to_string();
     assert!(
         fault.starts_with("H007") || fault.starts_with("H009"),
         "{fault}"
@@ -977,7 +982,7 @@ fn files_that_killed_processes_began_are_harmless() {
     drop(history);
     let (found, history) = History::examine(&dir).unwrap();
     assert_eq!((found.damage, found.runs), (Vec::new(), 9));
-    assert_eq!(history.trace("z2-7").unwrap(), sample_trace(6));
+    assert_eq!(history.traces().whole("z2-7").unwrap(), sample_trace(6));
 }
 
 #[test]
@@ -1020,7 +1025,10 @@ fn fill_up(dir: &Path) {
             history.run(&run.run).unwrap().actions[0].judgements.len(),
             PROPERTIES.len()
         );
-        assert_eq!(history.trace(&run.run).unwrap(), sample_trace(run.index));
+        assert_eq!(
+            history.traces().whole(&run.run).unwrap(),
+            sample_trace(run.index)
+        );
     }
     drop(history);
     let (found, _) = History::examine(dir).unwrap();

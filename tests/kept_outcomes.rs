@@ -83,13 +83,13 @@ fn assert_equal(whole: &History, outcomes: &History) {
             "{run}"
         );
         assert_eq!(
-            outcomes.recorded(run).unwrap(),
-            whole.recorded(run).unwrap(),
+            outcomes.traces().recorded(run).unwrap(),
+            whole.traces().recorded(run).unwrap(),
             "{run}"
         );
         assert_eq!(
-            outcomes.choices(run).unwrap(),
-            whole.choices(run).unwrap(),
+            outcomes.traces().choices(run).unwrap(),
+            whole.traces().choices(run).unwrap(),
             "{run}"
         );
     }
@@ -139,7 +139,7 @@ fn runs_kept_as_outcomes_answer_as_whole_runs_do() {
         let [whole, outcomes] = [whole, outcomes].map(|dir| History::open_existing(&dir).unwrap());
         assert_equal(&whole, &outcomes);
         assert_eq!(statements(&outcomes), statements(&whole));
-        let fault = outcomes.trace("k-1").unwrap_err();
+        let fault = outcomes.traces().whole("k-1").unwrap_err();
         assert_eq!(fault.iter().next().unwrap().code, "H031");
     }
 }
@@ -279,7 +279,7 @@ fn every_damaged_column_of_outcomes_is_named() {
                 let read = || {
                     history
                         .runs(&RunFilter::default())
-                        .and_then(|_| history.recorded(&format!("k-{run}")))
+                        .and_then(|_| history.traces().recorded(&format!("k-{run}")))
                 };
                 if let Err(faults) = read() {
                     assert!(

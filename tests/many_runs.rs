@@ -120,7 +120,10 @@ fn runs_of_shards_become_runs_of_the_merged_history() {
     for index in [7, 57, 58] {
         let run = format!("k-{}", index + 1);
         assert_eq!(into.is_whole(&run).unwrap(), index % WHOLE == 7);
-        assert_eq!(into.recorded(&run).unwrap(), alone.recorded(&run).unwrap());
+        assert_eq!(
+            into.traces().recorded(&run).unwrap(),
+            alone.traces().recorded(&run).unwrap()
+        );
     }
     assert_eq!(History::count_runs(into.dir()), RUNS);
 

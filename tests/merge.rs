@@ -161,7 +161,7 @@ fn four_shards_merged_in_any_order_equal_the_campaign() {
         assert_eq!(table(&into, END), wanted_end, "{order:?}");
         assert!(all(&into) == wanted_all, "{order:?}");
         for row in into.runs(&RunFilter::default()).unwrap() {
-            assert_eq!(into.trace(&row.run).unwrap().hash, row.trace_hash);
+            assert_eq!(into.traces().whole(&row.run).unwrap().hash, row.trace_hash);
         }
     }
 
@@ -313,7 +313,7 @@ fn a_missing_shard_is_reported_and_can_be_merged_later() {
     assert_eq!(all.campaign("k").unwrap().shards.len(), 4);
     for index in 0..8 {
         let run = sample_run("k", index);
-        assert_eq!(all.trace(&run.id).unwrap(), run.trace);
+        assert_eq!(all.traces().whole(&run.id).unwrap(), run.trace);
     }
 }
 
@@ -419,7 +419,7 @@ fn conflicts_are_reported_with_a_solution_and_write_nothing() {
         .collect();
     assert_eq!((ids.len(), ids[0].as_str()), (2, "k"), "{ids:?}");
     let (run, renamed) = (sample_run("k", 0), format!("{}-1", ids[1]));
-    assert_eq!(new.trace(&renamed).unwrap(), run.trace);
+    assert_eq!(new.traces().whole(&renamed).unwrap(), run.trace);
     let detail = new.run(&renamed).unwrap();
     assert_eq!(
         (detail.row.campaign.as_str(), &detail.actions[0].judgements),

@@ -106,7 +106,10 @@ fn a_reader_sees_the_state_of_its_opening_while_the_history_grows() {
             other => panic!("{other:?}"),
         };
     assert_eq!(stored(&reader), Some(Term::Integer(3)));
-    reader.write_nquads(&folder.path().join("all.nq")).unwrap();
+    reader
+        .rdf()
+        .write_nquads(&folder.path().join("all.nq"))
+        .unwrap();
     assert!(
         std::fs::read_to_string(folder.path().join("all.nq"))
             .unwrap()
@@ -153,7 +156,7 @@ fn a_reader_beside_a_writing_thread_sees_whole_runs() {
             assert_eq!(outcomes.len(), 5 * before);
             if let Some(row) = rows.last() {
                 assert_eq!(reader.run(&row.run).unwrap().actions[0].judgements.len(), 5);
-                assert!(reader.recorded(&row.run).is_ok());
+                assert!(reader.traces().recorded(&row.run).is_ok());
             }
         }
     });

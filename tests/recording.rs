@@ -297,7 +297,7 @@ mod with_recordings {
             .map(|row| {
                 (
                     history.run(&row.run).unwrap(),
-                    history.trace(&row.run).unwrap(),
+                    history.traces().whole(&row.run).unwrap(),
                 )
             })
             .collect()

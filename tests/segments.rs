@@ -147,7 +147,7 @@ fn the_next_owner_has_the_runs_of_a_killed_one_and_writes_a_segment_of_its_own()
     history.finish_campaign("k", &end()).unwrap();
     assert_eq!(runs(&history), first(5));
     for index in 0..4 {
-        let trace = history.trace(&format!("k-{}", index + 1)).unwrap();
+        let trace = history.traces().whole(&format!("k-{}", index + 1)).unwrap();
         assert_eq!(trace, sample_trace(index));
     }
     assert!(!history.is_whole("k-5").unwrap());
@@ -183,7 +183,7 @@ fn a_torn_tail_is_not_a_run() {
         assert_eq!(is_warned(&reader), is_lost, "{length} bytes");
         for index in 0..complete as u64 {
             let run = format!("k-{}", index + 1);
-            assert_eq!(reader.trace(&run).unwrap(), sample_trace(index));
+            assert_eq!(reader.traces().whole(&run).unwrap(), sample_trace(index));
         }
     }
     // The same for the next owner, who makes the lost run again.
@@ -346,7 +346,7 @@ fn reopening_a_campaign_removes_a_torn_tail() {
     drop(owner);
     let reader = History::open_to_read(&left).unwrap();
     assert_eq!((runs(&reader), is_warned(&reader)), (first(3), false));
-    assert_eq!(reader.trace("k-3").unwrap(), sample_trace(2));
+    assert_eq!(reader.traces().whole("k-3").unwrap(), sample_trace(2));
 }
 
 #[test]
@@ -386,9 +386,12 @@ fn salvaged(folder: &Path, left: &Path) -> (Vec<String>, Option<bool>, String) {
         let index = saved.run(run).unwrap().row.index;
         assert_eq!(saved.run(run).unwrap().actions[0].judgements.len(), 5);
         if saved.is_whole(run).unwrap() {
-            assert_eq!(saved.trace(run).unwrap(), sample_trace(index));
+            assert_eq!(saved.traces().whole(run).unwrap(), sample_trace(index));
         }
-        assert_eq!(saved.choices(run).unwrap(), sample_run("k", index).choices);
+        assert_eq!(
+            saved.traces().choices(run).unwrap(),
+            sample_run("k", index).choices
+        );
     }
     let is_whole = ids
         .contains(&"k-3".to_owned())
@@ -421,7 +424,7 @@ fn damage_to_a_column_is_reported_and_the_other_runs_are_saved() {
                     .and_then(|history| {
                         history.runs(&RunFilter::default())?;
                         history.run("k-3")?;
-                        history.trace("k-3")
+                        history.traces().whole("k-3")
                     })
                     .map(drop)
                     .unwrap_err()
@@ -435,7 +438,7 @@ fn damage_to_a_column_is_reported_and_the_other_runs_are_saved() {
             if extension != "runs" {
                 let history = History::open_to_read(&left).unwrap();
                 assert_eq!(runs(&history), first(3));
-                assert_eq!(history.trace("k-2").unwrap(), sample_trace(1));
+                assert_eq!(history.traces().whole("k-2").unwrap(), sample_trace(1));
                 assert_eq!(history.run("k-2").unwrap().actions.len(), 1);
             }
             let name = left.display().to_string();
@@ -482,7 +485,7 @@ fn runs_whose_frames_are_missing_are_reported() {
             let read = history
                 .run("k-3")
                 .map(drop)
-                .and_then(|()| history.trace("k-3").map(drop));
+                .and_then(|()| history.traces().whole("k-3").map(drop));
             let fault = read.unwrap_err().to_string();
             assert!(
                 ["H007", "H009"].iter().any(|code| fault.starts_with(code))
@@ -540,7 +543,11 @@ fn spliced_frames_are_found() {
                 for index in 0..3 {
                     let run = format!("k-{}", index + 1);
                     history.run(&run)?;
-                    assert_eq!(history.trace(&run)?, sample_trace(index), "{extension}");
+                    assert_eq!(
+                        history.traces().whole(&run)?,
+                        sample_trace(index),
+                        "{extension}"
+                    );
                 }
                 Ok(())
             });

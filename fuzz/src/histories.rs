@@ -176,9 +176,9 @@ fn read(history: &History) -> Result<(), Diagnostics> {
     for run in history.runs(&RunFilter::default())? {
         let _ = history.run(&run.run);
         let _ = history.newest_run(&run.run);
-        let _ = history.choices(&run.run);
-        let _ = history.recorded(&run.run);
-        let _ = history.trace(&run.run);
+        let _ = history.traces().choices(&run.run);
+        let _ = history.traces().recorded(&run.run);
+        let _ = history.traces().whole(&run.run);
     }
     Ok(())
 }

@@ -29,7 +29,7 @@ pub fn export(
     run: &RunDetail,
     folder: &Path,
 ) -> Result<String, Diagnostics> {
-    let (choices, trace) = history.recorded(&run.row.run)?;
+    let (choices, trace) = history.traces().recorded(&run.row.run)?;
     let index = env.index_of(&run.row.test, &choices)?;
     let test = &env.campaign.tests[env.test_of(index)];
     let performed = run.actions.len().min(test.len());

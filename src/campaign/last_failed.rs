@@ -223,7 +223,7 @@ fn failed_runs(
         .collect();
     let rows = history.runs(&filter)?;
     let failed_run = |row: &actcheck_history::RunRow| {
-        let choices = history.choices(&row.run)?;
+        let choices = history.traces().choices(&row.run)?;
         let index = env.index_of(&row.test, &choices)?;
         Ok(FailedRun {
             id: row.run.clone(),

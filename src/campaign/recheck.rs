@@ -174,7 +174,7 @@ fn judge_run(
     run: &RunRow,
     rules: &RuleSet,
 ) -> Result<Vec<Recheck>, Diagnostics> {
-    let trace = history.trace_of(run, rules.rules.reads_course())?;
+    let trace = history.traces().of(run, rules.rules.reads_course())?;
     let facts = facts::extract(&trace);
     let mut rechecks = Vec::new();
     for (step, performed) in trace.actions.iter().enumerate() {

@@ -157,9 +157,9 @@ fn replay(
     // Without kept motion, its states and the digest over all states are compared.
     let is_whole = history.is_whole(run)?;
     let (choices, was) = if !is_whole {
-        history.recorded(run)?
+        history.traces().recorded(run)?
     } else {
-        (history.choices(run)?, history.trace(run)?)
+        (history.traces().choices(run)?, history.traces().whole(run)?)
     };
     let index = env.index_of(&detail.row.test, &choices)?;
     // The wall clock is not part of a run's choices: the replay is cut off at the same simulated

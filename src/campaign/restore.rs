@@ -28,7 +28,7 @@ pub fn restorer(
     let known: Mutex<BTreeMap<String, Option<Arc<StoredCampaign>>>> = Mutex::default();
     Box::new(move |history, run| {
         let detail = history.run(run)?;
-        let (choices, was) = history.recorded(run)?;
+        let (choices, was) = history.traces().recorded(run)?;
         let campaign = {
             let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
             match known.get(&detail.row.campaign) {

@@ -33,13 +33,13 @@ pub fn rdf(args: &ExportRdfArgs) -> Result<(), Diagnostics> {
     };
     let history = history_dir::open_to_read(&args.history)?;
     let contents = if is_turtle {
-        history.write_turtle(file)?;
+        history.rdf().write_turtle(file)?;
         "campaigns, runs, scenes and outcomes"
     } else if args.complete {
-        history.write_complete_nquads(file)?;
+        history.rdf().write_complete_nquads(file)?;
         "the whole history with all facts"
     } else {
-        history.write_nquads(file)?;
+        history.rdf().write_nquads(file)?;
         "the whole history"
     };
     output::print_prose(&format!("{} holds {contents}\n", file.display()));

@@ -64,7 +64,7 @@ pub fn store(args: &ExportStoreArgs) -> Result<u8, Diagnostics> {
         if let Some(warning) = warning {
             output::print_diagnostics(&warning.into());
         }
-        let bar = bar(history.parts()? as u64);
+        let bar = bar(history.rdf().parts()? as u64);
         let sent = all(upload, args.complete, &history, &bar);
         bar.finish_and_clear();
         output::print_prose(&summary(&sent?, &address));
@@ -78,7 +78,7 @@ fn all(
     history: &History,
     bar: &ProgressBar,
 ) -> Result<Sent, Diagnostics> {
-    history.each_part(complete, &mut |part| {
+    history.rdf().each_part(complete, &mut |part| {
         let replaced = part.is_replaced.then(|| part.node.clone());
         bar.inc(1);
         upload.add(Part {

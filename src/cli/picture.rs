@@ -63,8 +63,9 @@ impl<'a> Picture<'a> {
         // Without its motion, the states before and after are drawn.
         let id = &run.row.run;
         let trace = history
-            .trace_if_allowed(id)?
-            .map_or_else(|| history.states(id), Ok)?;
+            .traces()
+            .whole_if_allowed(id)?
+            .map_or_else(|| history.traces().states(id), Ok)?;
         let drawing = run_picture(
             &Caption {
                 charts: charts(&trace, run, ontology),

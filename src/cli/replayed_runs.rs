@@ -37,7 +37,7 @@ pub(super) fn for_each_batch(
         let run = history.newest_run(id)?;
         // A run that broke before its first state has no trace; everything else about it is
         // reported.
-        let trace = match unless_damaged(history.trace_if_allowed(id))? {
+        let trace = match unless_damaged(history.traces().whole_if_allowed(id))? {
             Some(None) => return Ok(None),
             trace => trace.flatten(),
         };

@@ -274,7 +274,7 @@ impl<'a> AllureFolder<'a> {
         if !is_whole && self.restored > MOST_RESTORED {
             return Ok(Vec::new());
         }
-        let trace = match unless_damaged(self.history.trace_if_allowed(&run.row.run))? {
+        let trace = match unless_damaged(self.history.traces().whole_if_allowed(&run.row.run))? {
             Some(Some(trace)) => trace,
             Some(None) => {
                 self.withheld += 1;

@@ -102,7 +102,7 @@ pub(super) fn perceived(
     history: &History,
     run: &RunDetail,
 ) -> Result<BTreeMap<u32, String>, Diagnostics> {
-    let trace = history_dir::unless_damaged(history.states(&run.row.run))?;
+    let trace = history_dir::unless_damaged(history.traces().states(&run.row.run))?;
     Ok(trace
         .map(|trace| perceived_sentences(run, &trace))
         .unwrap_or_default())

@@ -90,7 +90,7 @@ pub fn shrink(args: &ShrinkArgs) -> Result<u8, Diagnostics> {
         context,
         stop: &stop,
     };
-    let recorded = history.choices(&run.row.run)?;
+    let recorded = history.traces().choices(&run.row.run)?;
     let index = env.index_of(&run.row.test, &recorded)?;
     let shrunk = shrink_one(&env, &history, (&run.row.run, index), &options)?;
     output::print(&match args.format {
@@ -159,7 +159,7 @@ fn shrink_one(
     (run, index): (&str, u64),
     options: &ShrinkOptions<'_>,
 ) -> Result<ShrunkSummary, Diagnostics> {
-    let recorded = history.choices(run)?;
+    let recorded = history.traces().choices(run)?;
     let shrunk = quietly(|| shrink::shrink(env, index, &recorded, options, &mut |_| {}))?;
     let record = shrink::store(env, history, run, index, &shrunk, &options.context)?;
     summary(env, history, (run, options.property), shrunk, &record)

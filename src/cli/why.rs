@@ -51,7 +51,9 @@ pub fn why(args: &WhyArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics> {
     let (files, path) = ontology_file(args.ontology.as_deref());
     let rules = RuleBook::prepare_within(&ontology::load(&files, &path)?, &budget)?;
     // Without its motion, properties about time can't be explained, but the others can.
-    let facts = history.allowed_facts(&run.row.run, rules.reads_course())?;
+    let facts = history
+        .traces()
+        .allowed_facts(&run.row.run, rules.reads_course())?;
     let perceived = show::perceived(&history, &run)?;
     let mut told = 0;
     let mut table = Table::new([

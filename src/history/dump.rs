@@ -13,7 +13,20 @@ use crate::view::{Demand, StatementMaker, WithFacts};
 use crate::{History, RdfSyntax, write_campaign};
 use actcheck_base::{Diagnostic, Diagnostics, NewFile};
 
+/// A history as RDF for other tools.
+#[derive(Clone, Copy)]
+pub struct RdfExport<'h> {
+    pub(crate) history: &'h History,
+}
+
 impl History {
+    /// The history as RDF for other tools.
+    pub fn rdf(&self) -> RdfExport<'_> {
+        RdfExport { history: self }
+    }
+}
+
+impl RdfExport<'_> {
     /// Calls `each` with all statements, campaign by campaign and run by run.
     ///
     /// # Errors
@@ -24,12 +37,12 @@ impl History {
         each: &mut dyn FnMut(Vec<Quad>) -> Result<(), Diagnostics>,
     ) -> Result<(), Diagnostics> {
         let demand = Demand::all();
-        for state in self.stored.states()? {
+        for state in self.history.stored.states()? {
             let mut statements = Statements::new(&demand);
             write_campaign::write(&state, &mut statements);
             each(statements.quads)?;
-            let runs = self.stored.runs_of(&state.record.id)?;
-            let maker = StatementMaker::new(&self.stored, &runs.id);
+            let runs = self.history.stored.runs_of(&state.record.id)?;
+            let maker = StatementMaker::new(&self.history.stored, &runs.id);
             for run in runs.iter() {
                 let later = runs.later_of(run.row.index);
                 each(maker.statements(run, &later, &demand, facts)?.quads)?;
@@ -47,11 +60,11 @@ impl History {
         self.write_quads(file, WithFacts::Lean)
     }
 
-    /// Writes the whole history as N-Quads like [`History::write_nquads`], but with complete facts
+    /// Writes the whole history as N-Quads like [`RdfExport::write_nquads`], but with complete facts
     /// in place of those that queries ask for.
     ///
     /// # Errors
-    /// As [`History::write_nquads`].
+    /// As [`RdfExport::write_nquads`].
     pub fn write_complete_nquads(&self, file: &Path) -> Result<(), Diagnostics> {
         self.write_quads(file, WithFacts::Complete)
     }
@@ -77,7 +90,7 @@ impl History {
     /// can't represent the named graphs.
     ///
     /// # Errors
-    /// As [`History::write_nquads`].
+    /// As [`RdfExport::write_nquads`].
     pub fn write_turtle(&self, file: &Path) -> Result<(), Diagnostics> {
         let failed = |why: io::Error| unwritten(file, &why.to_string());
         let (new, writer) = begin(file).map_err(failed)?;

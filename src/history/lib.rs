@@ -50,6 +50,7 @@ mod writers;
 
 pub use answer::{Cancel, QueryAnswer};
 pub use counted::{FAILED_AGAIN, newest_of_alike, without_counts};
+pub use dump::RdfExport;
 pub use entry::Entry;
 pub use foreign::{ForeignAnswer, check_query};
 pub use history::History;
@@ -58,6 +59,7 @@ pub use judged::{JudgedOutcome, JudgedRun, Judgements, LaterRules, Wish};
 pub use newest::NewestOutcomes;
 pub use parts::HistoryPart;
 pub use rdf_text::{RdfSyntax, rdf_text};
+pub use read_trace::Traces;
 pub use recheck::{NewestJudgements, Recheck, StoredJudgement};
 pub use record::{
     CampaignEnd, CampaignRecord, FindingRecord, Repetition, RunRecord, RunStatus, SkillRecord,

@@ -2,7 +2,7 @@
 
 use oxigraph::model::{GraphName, NamedNode, NamedOrBlankNode, Quad, Term};
 
-use crate::History;
+use crate::RdfExport;
 use crate::history::run_id;
 use crate::statements::Statements;
 use crate::view::{Demand, StatementMaker, WithFacts};
@@ -23,9 +23,9 @@ pub struct HistoryPart {
     pub statements: Vec<(Option<String>, String)>,
 }
 
-impl History {
-    /// Calls `each` with every part of the history: all statements of [`History::write_nquads`], or
-    /// with `complete` those of [`History::write_complete_nquads`]. First the campaigns, then their
+impl RdfExport<'_> {
+    /// Calls `each` with every part of the history: all statements of [`RdfExport::write_nquads`], or
+    /// with `complete` those of [`RdfExport::write_complete_nquads`]. First the campaigns, then their
     /// runs.
     ///
     /// # Errors
@@ -41,7 +41,7 @@ impl History {
         } else {
             WithFacts::Lean
         };
-        let states = self.stored.states()?;
+        let states = self.history.stored.states()?;
         for state in &states {
             let mut statements = Statements::new(&demand);
             write_campaign::write(state, &mut statements);
@@ -49,8 +49,8 @@ impl History {
             each(part(&node, true, statements.quads))?;
         }
         for state in &states {
-            let runs = self.stored.runs_of(&state.record.id)?;
-            let maker = StatementMaker::new(&self.stored, &runs.id);
+            let runs = self.history.stored.runs_of(&state.record.id)?;
+            let maker = StatementMaker::new(&self.history.stored, &runs.id);
             for run in runs.iter() {
                 let later = runs.later_of(run.row.index);
                 let quads = maker.statements(run, &later, &demand, facts)?.quads;
@@ -66,10 +66,10 @@ impl History {
     /// # Errors
     /// The history can't be read.
     pub fn parts(&self) -> Result<usize, Diagnostics> {
-        let ids = self.stored.ids()?;
+        let ids = self.history.stored.ids()?;
         let mut count = ids.len();
         for id in &ids {
-            count += self.stored.runs_of(id)?.len();
+            count += self.history.stored.runs_of(id)?.len();
         }
         Ok(count)
     }

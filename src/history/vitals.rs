@@ -2,7 +2,8 @@
 
 use crate::history::run_id;
 use crate::segment::SegmentColumn;
-use crate::{History, RunRow};
+use crate::trace_codec::head_choices;
+use crate::{History, RunRow, fault};
 use actcheck_base::Diagnostics;
 use actcheck_data::Choice;
 
@@ -34,7 +35,7 @@ impl History {
     /// Calls `each` with the health data of every run of a campaign, by index.
     ///
     /// # Errors
-    /// `H014` there is no such campaign; otherwise as [`History::trace`].
+    /// `H014` there is no such campaign; otherwise as [`crate::Traces::whole`].
     pub fn each_vitals(
         &self,
         campaign: &str,
@@ -44,9 +45,11 @@ impl History {
         let runs = self.stored.runs_of(campaign)?;
         for run in runs.iter() {
             let id = run_id(campaign, run.row.index);
-            let unread = |why| self.unread(&id, run, SegmentColumn::States, &why);
+            let (folder, column) = (&self.stored.folder, SegmentColumn::States);
             let states = run.segment.states(run.row);
-            let choices = self.choices_in(&id, run, &states.map_err(unread)?)?;
+            let states = states.map_err(|why| fault::run(folder, &id, run, column, &why))?;
+            let choices = head_choices(&states)
+                .map_err(|why| fault::undecodable(folder, &id, run, column, &why.to_string()))?;
             let discards = match run.row.discards {
                 0 => Vec::new(),
                 _ => self.run(&id)?.discards,

@@ -21,7 +21,7 @@ pub fn statements(history: &History) -> BTreeSet<String> {
 fn nquads(history: &History) -> String {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("all.nq");
-    history.write_nquads(&file).unwrap();
+    history.rdf().write_nquads(&file).unwrap();
     std::fs::read_to_string(file).unwrap()
 }
 

@@ -75,7 +75,7 @@ pub fn export_dataset(
     let further = course::COURSE.into_iter().filter(|_| with_course);
     let tables: Vec<&TableSpec> = FACTS.into_iter().chain(COURSES).chain(further).collect();
     export(runs, &tables, folder, |run, sheets| {
-        let Some(trace) = runs.history.trace_if_allowed(&run.row.run)? else {
+        let Some(trace) = runs.history.traces().whole_if_allowed(&run.row.run)? else {
             return add_facts(runs, run, sheets).map(|()| Motion::Withheld);
         };
         source::add(run, &trace, sheets);
@@ -105,7 +105,7 @@ fn add_facts(
     run: &RunDetail,
     sheets: &mut Sheets,
 ) -> Result<(), Diagnostics> {
-    let trace = runs.history.states(&run.row.run)?;
+    let trace = runs.history.traces().states(&run.row.run)?;
     source::add(run, &trace, sheets);
     fact_source::add(run, &trace, runs.hierarchy, sheets);
     Ok(())

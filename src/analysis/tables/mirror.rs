@@ -477,7 +477,7 @@ fn is_as_stored(
     let mut rows = Rows::default();
     for run in &runs {
         // Without its trace, a run's noise and effects can't be compared.
-        let Ok((choices, trace)) = history.recorded(run) else {
+        let Ok((choices, trace)) = history.traces().recorded(run) else {
             return Ok(true);
         };
         rows.add(&TableRun::new(history.newest_run(run)?, &choices, &trace));
@@ -524,7 +524,7 @@ fn table_runs(history: &History, runs: &[&String]) -> Vec<Result<TableRun, Diagn
 
 /// Reads a run.
 fn table_run(history: &History, run: &str) -> Result<TableRun, Diagnostics> {
-    let (choices, trace) = history.recorded(run)?;
+    let (choices, trace) = history.traces().recorded(run)?;
     Ok(TableRun::new(history.newest_run(run)?, &choices, &trace))
 }
 

@@ -186,7 +186,7 @@ pub(super) fn explain(
         .iter()
         .position(|performed| performed.action == *action)
         .unwrap_or_default();
-    let facts = history.facts(run, rules.reads_course())?;
+    let facts = history.traces().facts(run, rules.reads_course())?;
     let explained = facts
         .action(step)
         .map(|seen| rules.explain(&seen, property, &Budget::default()));

@@ -241,7 +241,7 @@ impl Writer<'_> {
         };
         let history = &self.sources[source];
         let id = run_id(&runs.id, index);
-        let unread = |column| move |why| history.unread(&id, run, column, &why);
+        let unread = |column| move |why| fault::run(&history.stored.folder, &id, run, column, &why);
         let mut stored = run
             .segment
             .run(run.row)
