@@ -25,7 +25,7 @@ const FORBIDDEN: [&str; 15] = [
 ];
 
 /// Sources that may use some of them, with the reason.
-const EXCEPTIONS: [(&str, &str); 11] = [
+const EXCEPTIONS: [(&str, &str); 10] = [
     ("base/below.rs", "creates the folder that the user named"),
     (
         "base/write_atomic.rs",
@@ -35,7 +35,6 @@ const EXCEPTIONS: [(&str, &str); 11] = [
         "base/scratch.rs",
         "a folder of its own, which only this user can write",
     ),
-    ("history/snapshot.rs", "writes into a scratch folder"),
     ("cli/bisect/child.rs", "writes into a scratch folder"),
     ("cli/bisect/repository.rs", "writes into a scratch folder"),
     (

@@ -221,10 +221,10 @@ fn campaign_of(history: &Path) -> String {
 fn with_judgements(history: &Path) {
     copy_made_history(history);
     let history = History::open(history).unwrap();
-    let run = history.runs(&RunFilter::default()).unwrap().remove(0).run;
-    let property = names::act("MovedObject");
+    let judged = history.outcomes(&RunFilter::default()).unwrap().remove(0);
+    let (run, property) = (judged.run, judged.property);
     let before = NewestJudgements::of(&history)
-        .read(&run, 1, std::slice::from_ref(&property))
+        .read(&run, judged.step, std::slice::from_ref(&property))
         .unwrap()
         .remove(0);
     let mut now = before.judgement.clone();

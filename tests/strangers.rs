@@ -96,7 +96,7 @@ fn an_id_of_a_foreign_history_does_not_lead_out_of_a_folder() {
         }
     }
     // The record names another folder than its own; a folder has a name that is not an id.
-    for id in ["../../../x", "campaign y", "..campaign", "\u{1b}[2Jpaign"] {
+    for id in ["../../../x", "campaign y", "..campaign", "\u{1b}[2Jmpaign"] {
         let folder = tempfile::tempdir().unwrap();
         let inside = folder.path().join("in/side");
         copy(made.path(), &inside);

@@ -207,7 +207,7 @@ fn rdf_is_complete(here: &Path) {
     let turtle = std::fs::read_to_string(here.join("h.ttl")).unwrap();
     assert!(
         turtle.contains("@prefix act: <http://actions#>")
-            && turtle.contains("a prov:Activity , act:Run"),
+            && turtle.contains("a act:Run , prov:Activity"),
         "{}",
         &turtle[..500]
     );

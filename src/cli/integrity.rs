@@ -99,10 +99,10 @@ fn text(found: &Integrity, dir: &Path) -> String {
             found.runs
         );
     }
-    if !found.unfinished.is_empty() {
+    for file in &found.unfinished {
         text.push_str(&format!(
-            "{} segments end within a run: a process is writing it, or was killed; `actcheck run --resume` makes such runs again\n",
-            found.unfinished.len()
+            "{}: its last run is not complete: a process is writing it, or was killed; `actcheck run --resume` makes it again\n",
+            dir.join(file).display()
         ));
     }
     text

@@ -45,7 +45,9 @@ impl CampaignState {
     /// # Errors
     /// Writing failed; an existing file is unchanged.
     pub(crate) fn write(&self, below: &Below, folder: &Path) -> io::Result<()> {
-        let content = packed(&postcard::to_stdvec(self).map_err(io::Error::other)?)?;
+        let mut nameless = self.clone();
+        nameless.record.id.clear();
+        let content = packed(&postcard::to_stdvec(&nameless).map_err(io::Error::other)?)?;
         let mut bytes = SegmentColumn::Campaign.head().to_vec();
         for _ in 0..COPIES {
             put(bytes.len() as u64, &content, &mut bytes)?;
@@ -84,7 +86,7 @@ impl CampaignState {
         Ok(states.next())
     }
 
-    /// Campaigns are known by the names of their folders.
+    /// Campaigns are known by the names of their folders alone.
     fn decode(content: &[u8], id: &str) -> Option<Self> {
         let mut state: Self = postcard::from_bytes(&unpacked(content)?).ok()?;
         id.clone_into(&mut state.record.id);

@@ -14,6 +14,8 @@ use actcheck_base::{Diagnostics, names};
 
 /// The readable campaigns of a damaged history, by id.
 pub(crate) type Salvaged = BTreeMap<String, (Arc<CampaignState>, Arc<CampaignRuns>)>;
+/// A value of each campaign that was read, with the files that it was read from.
+type Known<F, T> = Mutex<HashMap<String, (F, Arc<T>)>>;
 
 /// The stored campaigns.
 pub(crate) struct StoredCampaigns {
@@ -22,8 +24,8 @@ pub(crate) struct StoredCampaigns {
     shown: Option<RwLock<Arc<FolderExtent>>>,
     /// The campaigns of a damaged history, as far as they are readable.
     salvaged: Option<Salvaged>,
-    known_states: Mutex<HashMap<String, ([u64; 3], Arc<CampaignState>)>>,
-    known_runs: Mutex<HashMap<String, (CampaignExtent, Arc<CampaignRuns>)>>,
+    known_states: Known<[u64; 3], CampaignState>,
+    known_runs: Known<CampaignExtent, CampaignRuns>,
 }
 
 impl StoredCampaigns {

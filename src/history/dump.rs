@@ -5,7 +5,7 @@ use std::io::{self, BufWriter, Write as _};
 use std::path::Path;
 
 use oxigraph::io::{RdfFormat, RdfSerializer};
-use oxigraph::model::Quad;
+use oxigraph::model::{Quad, TripleRef};
 
 use crate::rdf_text::serializer;
 use crate::statements::Statements;
@@ -96,14 +96,11 @@ impl RdfExport<'_> {
         let (new, writer) = begin(file).map_err(failed)?;
         let mut writer = serializer(RdfSyntax::Turtle).for_writer(writer);
         self.each_statements(WithFacts::No, &mut |quads| {
-            let of_default = quads
+            let mut of_default = quads
                 .iter()
                 .filter(|quad| quad.graph_name.is_default_graph());
             of_default
-                .map(|quad| {
-                    writer.serialize_triple(oxigraph::model::TripleRef::from(quad.as_ref()))
-                })
-                .collect::<io::Result<()>>()
+                .try_for_each(|quad| writer.serialize_triple(TripleRef::from(quad.as_ref())))
                 .map_err(failed)
         })?;
         writer

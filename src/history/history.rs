@@ -351,7 +351,8 @@ impl History {
         })
     }
 
-    /// Removes the end of a campaign that is resumed, and what a killed process left of a run.
+    /// Removes the end of a campaign that is resumed, and the half of a run that a killed process
+    /// left.
     ///
     /// # Errors
     /// Writing failed: `H005`, `H006`; `H014` there is no such campaign.

@@ -176,7 +176,11 @@ impl History {
             let state = CampaignState::salvage(&below, &path, id)
                 .map_err(|error| fault::io(dir, "reading a campaign", &error))?;
             match state {
-                Some(state) => {
+                Some(mut state) => {
+                    if !lost.is_empty() {
+                        // Resuming the campaign makes the lost runs again.
+                        state.end = None;
+                    }
                     all_lost.extend(lost.iter().map(|index| run_id(id, *index)));
                     campaigns.insert(id.clone(), (Arc::new(state), Arc::new(runs)));
                 }

@@ -318,7 +318,7 @@ pub(crate) fn whole_length(below: &Below, file: &Path) -> io::Result<u64> {
     let column = SegmentColumn::OF_SEGMENTS
         .into_iter()
         .find(|column| extension == column.extension())
-        .ok_or_else(|| io::Error::other("it is no column of a segment"))?;
+        .ok_or_else(|| io::Error::other("its name is not that of a column"))?;
     let whole = || -> Result<u64, ReadFault> {
         let mut frames = Frames::new(column, BufReader::new(below.open(file)?))?;
         let mut content = Vec::new();
