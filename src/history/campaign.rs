@@ -58,7 +58,7 @@ impl CampaignRuns {
         };
         let unread = |number: u32, column: SegmentColumn, fault: &ReadFault| {
             let file = dir.join(format!("{number:04}.{}", column.extension()));
-            fault::segment(folder, &file, fault)
+            fault::segment(folder.dir(), &file, fault)
         };
         for (number, lengths) in &extent.segments {
             if let Some(length) = lengths.runs {

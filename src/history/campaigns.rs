@@ -8,7 +8,7 @@ use crate::campaign::{CampaignRuns, RunAt};
 use crate::campaign_state::CampaignState;
 use crate::fault;
 use crate::folder::{CampaignExtent, Folder, FolderExtent};
-use crate::history::{place_of, run_id};
+use crate::ids::{place_of, run_id};
 use crate::segment::whole_length;
 use actcheck_base::{Diagnostics, names};
 
@@ -142,7 +142,7 @@ impl StoredCampaigns {
         }
         let folder = self.folder.campaign(id);
         let state = CampaignState::read(&self.folder.below(), &folder, id)
-            .map_err(|fault| fault::segment(&self.folder, &folder.join("campaign"), &fault))?;
+            .map_err(|fault| fault::segment(self.folder.dir(), &folder.join("campaign"), &fault))?;
         let state = Arc::new(state);
         known.insert(id.to_owned(), (extent.state, Arc::clone(&state)));
         Ok(Some(state))
@@ -189,7 +189,7 @@ impl StoredCampaigns {
         let present = CampaignRuns::read(&self.folder, id, &extent)?;
         match present.shortened(&state.segments) {
             Some(file) => Err(fault::shortened(
-                &self.folder,
+                self.folder.dir(),
                 &self.folder.campaign(id).join(file),
             )),
             None => Ok(()),

@@ -3,9 +3,7 @@
 use std::io::ErrorKind;
 use std::path::Path;
 
-use crate::campaign::RunAt;
-use crate::folder::Folder;
-use crate::segment::{ReadFault, SegmentColumn};
+use crate::segment::ReadFault;
 use actcheck_base::{Diagnostic, Diagnostics, FileKind, NotPlain};
 
 /// H001: a folder can't be used as a history, or can't be accessed.
@@ -82,61 +80,45 @@ pub(super) fn io(dir: &Path, doing: &str, error: &std::io::Error) -> Diagnostics
     failed(dir, doing, error.kind(), &error.to_string())
 }
 
-/// H007: a file of a segment or of a campaign is damaged; or it can't be read.
-pub(super) fn segment(folder: &Folder, file: &Path, fault: &ReadFault) -> Diagnostics {
+/// H007: a file of a segment or of a campaign is damaged; H009: it is missing; or it can't be read.
+pub(super) fn segment(dir: &Path, file: &Path, fault: &ReadFault) -> Diagnostics {
     match fault {
-        ReadFault::Io(error) if error.kind() == ErrorKind::NotFound => missing(folder, file),
-        ReadFault::Io(error) => io(
-            folder.dir(),
-            &format!("reading `{}`", file.display()),
-            error,
+        ReadFault::Io(error) if error.kind() == ErrorKind::NotFound => missing(dir, file),
+        ReadFault::Io(error) => io(dir, &format!("reading `{}`", file.display()), error),
+        ReadFault::Damaged(fault) => damaged(
+            dir,
+            &format!("`{}`: {fault}", relative(dir, file).display()),
         ),
-        ReadFault::Damaged(fault) => {
-            let file = folder.relative(file).display();
-            damaged(folder.dir(), &format!("`{file}`: {fault}"))
-        }
     }
 }
 
 /// H007: a segment has fewer runs or judgements than it had.
-pub(super) fn shortened(folder: &Folder, file: &Path) -> Diagnostics {
-    let file = folder.relative(file).display();
-    damaged(folder.dir(), &format!("`{file}` is shorter than it was"))
+pub(super) fn shortened(dir: &Path, file: &Path) -> Diagnostics {
+    let file = relative(dir, file).display();
+    damaged(dir, &format!("`{file}` is shorter than it was"))
 }
 
-/// H007: a value of a run is damaged; or it can't be read.
-pub(super) fn run(
-    folder: &Folder,
-    id: &str,
-    run: RunAt<'_>,
-    column: SegmentColumn,
-    fault: &ReadFault,
-) -> Diagnostics {
-    let file = run.segment.file(column);
+/// H007: a value of a run is damaged; or it can't be read. `file`: the column.
+pub(super) fn run(dir: &Path, id: &str, file: &Path, fault: &ReadFault) -> Diagnostics {
     match fault {
-        ReadFault::Io(_) => segment(folder, &file, fault),
-        ReadFault::Damaged(fault) => {
-            let file = folder.relative(&file).display();
-            damaged(folder.dir(), &format!("`{file}`, run {id}: {fault}"))
-        }
+        ReadFault::Io(_) => segment(dir, file, fault),
+        ReadFault::Damaged(fault) => undecodable(dir, id, file, &fault.to_string()),
     }
 }
 
-/// H007: the content of a value of a run is none of this program.
-pub(super) fn undecodable(
-    folder: &Folder,
-    id: &str,
-    run: RunAt<'_>,
-    column: SegmentColumn,
-    why: &str,
-) -> Diagnostics {
-    let file = run.segment.file(column);
-    let file = folder.relative(&file).display();
-    damaged(folder.dir(), &format!("`{file}`, run {id}: {why}"))
+/// H007: the content of a value of a run is none of this program. `file`: the column.
+pub(super) fn undecodable(dir: &Path, id: &str, file: &Path, why: &str) -> Diagnostics {
+    let file = relative(dir, file).display();
+    damaged(dir, &format!("`{file}`, run {id}: {why}"))
+}
+
+/// A path as messages name it: relative to the history.
+pub(super) fn relative<'p>(dir: &Path, path: &'p Path) -> &'p Path {
+    path.strip_prefix(dir).unwrap_or(path)
 }
 
 /// H009: a file of a segment is missing.
-fn missing(folder: &Folder, file: &Path) -> Diagnostics {
+fn missing(dir: &Path, file: &Path) -> Diagnostics {
     let message = format!(
         "values of runs can't be read: `{}` is missing",
         file.display()
@@ -144,7 +126,7 @@ fn missing(folder: &Folder, file: &Path) -> Diagnostics {
     Diagnostic::error("H009", message)
         .help(format!(
             "restore the file from a backup; the other files of the history `{}` are intact",
-            folder.dir().display()
+            dir.display()
         ))
         .into()
 }

@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{File, TryLockError};
-use std::io::{self, ErrorKind};
+use std::io::ErrorKind;
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 use std::thread::sleep;
@@ -21,8 +21,6 @@ const FORMAT: u64 = 5;
 const TITLE: &str = "actcheck history";
 /// Longest version file. Unit: bytes.
 const LONGEST_VERSION: u64 = 1_000;
-/// Longest file that is read as a whole, which only the examination of damage does. Unit: bytes.
-const LONGEST: u64 = 16 << 30;
 /// The names in the folder of a history that this program opens, with their kinds. Others are left
 /// alone.
 const LAYOUT: [(&str, FileKind); 6] = [
@@ -137,11 +135,6 @@ impl Folder {
     /// Where a campaign and its segments are.
     pub(super) fn campaign(&self, id: &str) -> PathBuf {
         self.campaigns().join(id)
-    }
-
-    /// A path as messages name it: relative to the history.
-    pub(super) fn relative<'p>(&self, path: &'p Path) -> &'p Path {
-        path.strip_prefix(&self.dir).unwrap_or(path)
     }
 
     /// The files of all campaigns at this moment.
@@ -312,14 +305,6 @@ fn check_layout(dir: &Path) -> Result<(), Diagnostics> {
         }
     }
     Ok(())
-}
-
-/// Reads a file of a history as a whole.
-///
-/// # Errors
-/// It is missing, far longer than any that this program writes, or can't be read.
-pub(super) fn read_all(below: &Below, path: &Path) -> io::Result<Vec<u8>> {
-    below.read(path, LONGEST)
 }
 
 /// Whether the folder has a version that this program reads.

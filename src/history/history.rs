@@ -8,16 +8,14 @@ use std::sync::{Mutex, OnceLock};
 use crate::campaign_state::CampaignState;
 use crate::campaigns::StoredCampaigns;
 use crate::folder::Folder;
+use crate::ids::{campaign_id, run_id};
 use crate::restore::Restore;
 use crate::segment::SegmentColumn;
 use crate::threads::cores;
 use crate::view::View;
 use crate::writers::OpenSegments;
-use crate::{
-    CampaignEnd, CampaignRecord, CampaignRow, Cancel, Judgements, OutcomeRow, QueryAnswer,
-    RunDetail, RunFilter, RunRow, Wish, fault, query,
-};
-use actcheck_base::{Diagnostic, Diagnostics, Digest, Source, names, nearest};
+use crate::{CampaignEnd, CampaignRecord, CampaignRow, RunDetail, fault};
+use actcheck_base::{Diagnostic, Diagnostics, names, nearest};
 
 /// A history that only this process may write, or that it only reads (after
 /// [`History::open_to_read`]).
@@ -217,21 +215,6 @@ impl History {
 
 /// Reading runs.
 impl History {
-    /// Returns the runs that match a filter, sorted by the start of their campaign, then by index.
-    /// An unknown campaign has no runs.
-    ///
-    /// # Errors
-    /// A file is damaged or can't be read; `H026` an id is not an id.
-    pub fn runs(&self, filter: &RunFilter) -> Result<Vec<RunRow>, Diagnostics> {
-        let mut runs = Vec::new();
-        let wish = Wish {
-            judgements: Judgements::None,
-            ..Wish::default()
-        };
-        self.each_judged(filter, wish, &mut |run| runs.push(run.row))?;
-        Ok(runs)
-    }
-
     /// Returns the campaigns of [`History::unselected_campaigns`], each with its run ids, sorted as
     /// strings.
     ///
@@ -249,19 +232,6 @@ impl History {
         Ok(found)
     }
 
-    /// Returns the outcomes of the runs that match a filter, in the order of [`History::runs`],
-    /// then by step and property.
-    ///
-    /// # Errors
-    /// A file is damaged or can't be read.
-    pub fn outcomes(&self, filter: &RunFilter) -> Result<Vec<OutcomeRow>, Diagnostics> {
-        let mut outcomes = Vec::new();
-        self.each_judged(filter, Wish::default(), &mut |run| {
-            outcomes.extend(run.outcome_rows())
-        })?;
-        Ok(outcomes)
-    }
-
     /// Returns all details of a run, named as in [`History::resolve`].
     ///
     /// # Errors
@@ -270,9 +240,8 @@ impl History {
         let id = self.resolve(name)?;
         let detail = self.stored.with_run(&id, |campaign, run| {
             let stored = run.segment.run(run.row);
-            let details = SegmentColumn::Details;
-            let stored = stored
-                .map_err(|fault| fault::run(&self.stored.folder, &id, run, details, &fault))?;
+            let file = run.segment.file(SegmentColumn::Details);
+            let stored = stored.map_err(|fault| fault::run(self.dir(), &id, &file, &fault))?;
             Ok(stored.detail(campaign))
         })?;
         detail.ok_or_else(|| fault::no_run(self.dir(), &id))
@@ -289,28 +258,6 @@ impl History {
     pub fn is_whole(&self, id: &str) -> Result<bool, Diagnostics> {
         let is_whole = self.stored.with_run(id, |_, run| Ok(run.row.is_whole()))?;
         Ok(is_whole.unwrap_or_default())
-    }
-
-    /// Answers a SPARQL query. The prefixes of [`actcheck_base::names::PREFIXES`] need no
-    /// declaration.
-    ///
-    /// The default graph holds campaigns, runs, executions, scenes and outcomes; facts are in the
-    /// graphs that `act:before`, `act:after` and `act:during` name.
-    ///
-    /// # Errors
-    /// `H010` the text is not a query, `H011` it is an update, `H012` the evaluation failed, `H030`
-    /// it needs too many statements.
-    pub fn query(&self, sparql: &str) -> Result<QueryAnswer, Diagnostics> {
-        self.query_from(&Source::new("query", sparql), &Cancel::new())
-    }
-
-    /// Like [`History::query`], for a source text with a name, and with a handle that stops the
-    /// query.
-    ///
-    /// # Errors
-    /// As [`History::query`]; `H013` the query was stopped.
-    pub fn query_from(&self, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
-        query::answer(self, text, cancel)
     }
 }
 
@@ -406,38 +353,4 @@ impl History {
     pub fn flush(&self) -> Result<(), Diagnostics> {
         self.segments.flush(&self.stored.folder)
     }
-}
-
-/// The id of a run from its campaign and its index.
-pub(crate) fn run_id(campaign: &str, index: u64) -> String {
-    format!("{campaign}-{}", index + 1)
-}
-
-/// The campaign and the index of a run, from its id.
-pub(crate) fn place_of(run: &str) -> Option<(&str, u64)> {
-    let (campaign, number) = run.rsplit_once('-')?;
-    let index = number.parse::<u64>().ok()?.checked_sub(1)?;
-    // Only the number as this program writes it.
-    (run == run_id(campaign, index)).then_some((campaign, index))
-}
-
-/// Computes a campaign's id: a letter and three letters or digits, without characters that look
-/// alike.
-pub(crate) fn campaign_id(config_digest: &str, seed: u64, counter: u64) -> String {
-    const LETTERS: &[u8] = b"abcdefghjkmnpqrstvwxyz";
-    const ALL: &[u8] = b"abcdefghjkmnpqrstvwxyz23456789";
-    let mut digest = Digest::new();
-    digest.update(config_digest.as_bytes());
-    digest.update(&seed.to_le_bytes());
-    digest.update(&counter.to_le_bytes());
-    let bytes = digest.finish().into_bytes();
-    let number = |at: usize| {
-        bytes[at..at + 4]
-            .iter()
-            .fold(0usize, |sum, byte| sum * 256 + usize::from(*byte))
-    };
-    [(LETTERS, 0), (ALL, 4), (ALL, 8), (ALL, 12)]
-        .map(|(set, at)| char::from(set[number(at) % set.len()]))
-        .iter()
-        .collect()
 }

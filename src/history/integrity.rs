@@ -8,7 +8,7 @@ use crate::campaign::{CampaignRuns, RunAt};
 use crate::campaign_state::CampaignState;
 use crate::campaigns::StoredCampaigns;
 use crate::folder::{CampaignExtent, Folder};
-use crate::history::run_id;
+use crate::ids::run_id;
 use crate::segment::{ReadFault, Segment, SegmentColumn, read_judgements, salvage_judgements};
 use crate::trace_codec::{decode_head, decode_motion};
 use crate::{History, fault};
@@ -71,7 +71,7 @@ impl History {
         found: &mut Integrity,
     ) -> Result<(), Diagnostics> {
         let (below, folder) = (self.stored.folder.below(), self.stored.folder.campaign(id));
-        let relative = |file: &Path| self.stored.folder.relative(file).to_path_buf();
+        let relative = |file: &Path| fault::relative(self.dir(), file).to_path_buf();
         let state = match CampaignState::read(&below, &folder, id) {
             Ok(state) => Some(state),
             Err(why) => {
@@ -202,7 +202,7 @@ fn salvaged(
     extent: &CampaignExtent,
 ) -> Result<(CampaignRuns, Vec<u64>), Diagnostics> {
     let (below, path) = (folder.below(), folder.campaign(id));
-    let unread = |why: ReadFault| fault::segment(folder, &path, &why);
+    let unread = |why: ReadFault| fault::segment(folder.dir(), &path, &why);
     let (mut runs, mut all_lost) = (CampaignRuns::default(), Vec::new());
     id.clone_into(&mut runs.id);
     for (number, lengths) in &extent.segments {

@@ -76,6 +76,49 @@ impl JudgedRun {
 }
 
 impl History {
+    /// Returns the runs that match a filter, sorted by the start of their campaign, then by index.
+    /// An unknown campaign has no runs.
+    ///
+    /// # Errors
+    /// A file is damaged or can't be read; `H026` an id is not an id.
+    pub fn runs(&self, filter: &RunFilter) -> Result<Vec<RunRow>, Diagnostics> {
+        let mut runs = Vec::new();
+        let wish = Wish {
+            judgements: Judgements::None,
+            ..Wish::default()
+        };
+        self.each_judged(filter, wish, &mut |run| runs.push(run.row))?;
+        Ok(runs)
+    }
+
+    /// Returns the outcomes of the runs that match a filter, in the order of [`History::runs`],
+    /// then by step and property.
+    ///
+    /// # Errors
+    /// A file is damaged or can't be read.
+    pub fn outcomes(&self, filter: &RunFilter) -> Result<Vec<OutcomeRow>, Diagnostics> {
+        let mut outcomes = Vec::new();
+        self.each_judged(filter, Wish::default(), &mut |run| {
+            outcomes.extend(run.outcome_rows())
+        })?;
+        Ok(outcomes)
+    }
+
+    /// Returns the scenes of runs by run id.
+    ///
+    /// # Errors
+    /// A file is damaged or can't be read.
+    pub fn scenes(&self, runs: &[RunRow]) -> Result<BTreeMap<String, SceneDigest>, Diagnostics> {
+        let mut scenes = BTreeMap::new();
+        for row in runs {
+            let of_campaign = self.stored.runs_of(&row.campaign)?;
+            if let Some(run) = of_campaign.find(row.index) {
+                scenes.insert(row.run.clone(), run.row.scene());
+            }
+        }
+        Ok(scenes)
+    }
+
     /// Calls `each` with the runs that match a filter, in the order of their campaigns, then by
     /// index. Returns the digests of the rules of later judgements.
     ///

@@ -17,6 +17,7 @@ mod foreign;
 mod frames;
 mod graphs;
 mod history;
+mod ids;
 mod integrity;
 mod judged;
 mod light;
@@ -67,6 +68,6 @@ pub use record::{
 pub use restore::Restore;
 pub use rows::{ActionDetail, CampaignRow, ObjectDetail, OutcomeRow, RunDetail, RunFilter, RunRow};
 pub use scene_digest::SceneDigest;
+pub use stored_run::{NOISE_TERMS, noise};
 pub use vitals::RunVitals;
 pub use wire::{WireFault, WireLimits, WireSyntax};
-pub use write_scene::{NOISE_TERMS, noise};

@@ -3,7 +3,7 @@
 use oxigraph::model::{GraphName, NamedNode, NamedOrBlankNode, Quad, Term};
 
 use crate::RdfExport;
-use crate::history::run_id;
+use crate::ids::run_id;
 use crate::statements::Statements;
 use crate::view::{Demand, StatementMaker, WithFacts};
 use crate::write_campaign::{self, campaign_node};

@@ -12,7 +12,7 @@ use oxigraph::sparql::{
 use crate::evaluation::{Unfinished, evaluate};
 use crate::syntax_fault::syntax_fault;
 use crate::terms::{from_store, to_store};
-use crate::view::Demand;
+use crate::view::{Dataset, Demand};
 use crate::{Cancel, History, QueryAnswer};
 use actcheck_base::{
     COUNTED_TEXT, Diagnostic, Diagnostics, MOST_NESTED_CALLS, Source, Span, TEXT_FUNCTIONS, Term,
@@ -34,12 +34,41 @@ const LONGEST_TEXT: usize = 32 << 20;
 const MOST_KNOWN: usize = 256;
 const LONGEST_KNOWN: usize = 512;
 
+impl History {
+    /// Answers a SPARQL query. The prefixes of [`actcheck_base::names::PREFIXES`] need no
+    /// declaration.
+    ///
+    /// The default graph holds campaigns, runs, executions, scenes and outcomes; facts are in the
+    /// graphs that `act:before`, `act:after` and `act:during` name.
+    ///
+    /// # Errors
+    /// `H010` the text is not a query, `H011` it is an update, `H012` the evaluation failed, `H030`
+    /// it needs too many statements.
+    pub fn query(&self, sparql: &str) -> Result<QueryAnswer, Diagnostics> {
+        self.query_from(&Source::new("query", sparql), &Cancel::new())
+    }
+
+    /// Like [`History::query`], for a source text with a name, and with a handle that stops the
+    /// query.
+    ///
+    /// # Errors
+    /// As [`History::query`]; `H013` the query was stopped.
+    pub fn query_from(&self, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
+        answer(self, text, cancel)
+    }
+
+    /// Returns the statements that a query demands, and maybe others.
+    ///
+    /// # Errors
+    /// `H030` these are too many; a file is damaged or can't be read.
+    pub(super) fn dataset(&self, demand: Demand) -> Result<Arc<Dataset>, Diagnostics> {
+        let mut view = self.view.lock().unwrap_or_else(PoisonError::into_inner);
+        view.dataset(&self.stored, self.threads(), demand)
+    }
+}
+
 /// Answers a query.
-pub(super) fn answer(
-    history: &History,
-    text: &Source,
-    cancel: &Cancel,
-) -> Result<QueryAnswer, Diagnostics> {
+fn answer(history: &History, text: &Source, cancel: &Cancel) -> Result<QueryAnswer, Diagnostics> {
     refuse_update(text)?;
     refuse_excess(text)?;
     let query = prepare(history, text, cancel)?;

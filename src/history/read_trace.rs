@@ -118,10 +118,9 @@ impl Traces<'_> {
         if recorded.1.hash != run.row.trace_hash() {
             let why = "these are the states of another run";
             return Err(fault::undecodable(
-                &self.history.stored.folder,
+                self.history.dir(),
                 id,
-                run,
-                SegmentColumn::States,
+                &run.segment.file(SegmentColumn::States),
                 why,
             ));
         }
@@ -202,7 +201,7 @@ impl Traces<'_> {
         column: SegmentColumn,
         why: &ReadFault,
     ) -> Diagnostics {
-        fault::run(&self.history.stored.folder, id, run, column, why)
+        fault::run(self.history.dir(), id, &run.segment.file(column), why)
     }
 
     fn undecodable(
@@ -213,10 +212,9 @@ impl Traces<'_> {
         why: &CodecFault,
     ) -> Diagnostics {
         fault::undecodable(
-            &self.history.stored.folder,
+            self.history.dir(),
             id,
-            run,
-            column,
+            &run.segment.file(column),
             &why.to_string(),
         )
     }

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, PoisonError, RwLock};
 
 use crate::campaign::CampaignRuns;
-use crate::history::place_of;
+use crate::ids::place_of;
 use crate::judged::newest;
 use crate::segment::{LaterJudgement, SegmentColumn};
 use crate::{History, RunDetail, fault};
@@ -83,10 +83,9 @@ impl<'h> NewestJudgements<'h> {
         if is_judged {
             let stored = at.segment.run(at.row).map_err(|why| {
                 fault::run(
-                    &self.history.stored.folder,
+                    self.history.dir(),
                     run,
-                    at,
-                    SegmentColumn::Details,
+                    &at.segment.file(SegmentColumn::Details),
                     &why,
                 )
             })?;

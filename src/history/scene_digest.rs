@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{History, ObjectDetail, RunRow};
-use actcheck_base::{Diagnostics, Digest};
+use crate::ObjectDetail;
+use actcheck_base::Digest;
 
 /// The scene of a run, in two digests.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -15,23 +15,6 @@ pub struct SceneDigest {
     pub arrangement: String,
     /// Mass, friction and restitution of the objects.
     pub physics: String,
-}
-
-impl History {
-    /// Returns the scenes of runs by run id.
-    ///
-    /// # Errors
-    /// A file is damaged or can't be read.
-    pub fn scenes(&self, runs: &[RunRow]) -> Result<BTreeMap<String, SceneDigest>, Diagnostics> {
-        let mut scenes = BTreeMap::new();
-        for row in runs {
-            let of_campaign = self.stored.runs_of(&row.campaign)?;
-            if let Some(run) = of_campaign.find(row.index) {
-                scenes.insert(row.run.clone(), run.row.scene());
-            }
-        }
-        Ok(scenes)
-    }
 }
 
 impl SceneDigest {

@@ -6,12 +6,51 @@ use std::collections::BTreeMap;
 use oxigraph::model::Literal;
 use serde::{Deserialize, Serialize};
 
-use crate::write_scene::noise;
 use crate::{
     ActionDetail, ObjectDetail, Repetition, RunDetail, RunRecord, RunRow, RunStatus, SceneDigest,
 };
 use actcheck_base::Judgement;
-use actcheck_data::{ActionEnd, ActionTrace, Quality, Role, SceneObject};
+use actcheck_data::{ActionEnd, ActionTrace, Quality, Role, Scene, SceneObject};
+
+/// Local names of the terms for sensing errors, in the order of [`noise`].
+pub const NOISE_TERMS: [&str; 13] = [
+    "positionNoise",
+    "heightNoise",
+    "yawNoise",
+    "sizeNoise",
+    "localisationNoise",
+    "headingNoise",
+    "gripperNoise",
+    "rangeNoise",
+    "odometryDrift",
+    "odometryHeadingDrift",
+    "landmarkDistance",
+    "landmarkNoise",
+    "landmarkHeadingNoise",
+];
+
+/// Returns the sensing errors of a scene, most of them standard deviations, with the local names of
+/// their terms. Units: those of the terms.
+pub fn noise(scene: &Scene) -> [(&'static str, f64); 13] {
+    let sensing = &scene.sensing;
+    let odometry = &sensing.odometry;
+    let values = [
+        sensing.position_noise_m,
+        sensing.height_noise_m,
+        sensing.yaw_noise_rad,
+        sensing.size_noise_m,
+        sensing.localisation_noise_m,
+        sensing.heading_noise_rad,
+        sensing.gripper_noise_m,
+        sensing.camera.range_noise_m,
+        odometry.drift,
+        odometry.heading_drift,
+        odometry.landmark_every_m,
+        odometry.landmark_noise_m,
+        odometry.landmark_noise_rad,
+    ];
+    std::array::from_fn(|idx| (NOISE_TERMS[idx], values[idx]))
+}
 
 /// The values of one run. Its campaign's id is that of the place where it is stored.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -6,7 +6,7 @@
 use std::path::PathBuf;
 
 use crate::campaign::CampaignRuns;
-use crate::history::run_id;
+use crate::ids::run_id;
 use crate::segment::{ReadFault, SegmentColumn, indices_after};
 use crate::{History, fault};
 use actcheck_base::{Diagnostic, Diagnostics};
@@ -81,7 +81,7 @@ impl History {
             ),
         };
         let (file, dir) = (
-            self.stored.folder.relative(&tail.file).display(),
+            fault::relative(self.dir(), &tail.file).display(),
             self.dir().display(),
         );
         let message = if tail.is_cut {

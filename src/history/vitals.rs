@@ -1,6 +1,6 @@
 //! Values of a run that show the health of its campaign.
 
-use crate::history::run_id;
+use crate::ids::run_id;
 use crate::segment::SegmentColumn;
 use crate::trace_codec::head_choices;
 use crate::{History, RunRow, fault};
@@ -45,11 +45,11 @@ impl History {
         let runs = self.stored.runs_of(campaign)?;
         for run in runs.iter() {
             let id = run_id(campaign, run.row.index);
-            let (folder, column) = (&self.stored.folder, SegmentColumn::States);
+            let file = run.segment.file(SegmentColumn::States);
             let states = run.segment.states(run.row);
-            let states = states.map_err(|why| fault::run(folder, &id, run, column, &why))?;
+            let states = states.map_err(|why| fault::run(self.dir(), &id, &file, &why))?;
             let choices = head_choices(&states)
-                .map_err(|why| fault::undecodable(folder, &id, run, column, &why.to_string()))?;
+                .map_err(|why| fault::undecodable(self.dir(), &id, &file, &why.to_string()))?;
             let discards = match run.row.discards {
                 0 => Vec::new(),
                 _ => self.run(&id)?.discards,

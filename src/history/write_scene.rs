@@ -2,52 +2,12 @@
 
 use oxigraph::model::NamedNode;
 
-use crate::ObjectDetail;
 use crate::statements::{Statements, iri};
 use crate::stored_run::StoredScene;
+use crate::{NOISE_TERMS, ObjectDetail};
 use actcheck_base::names;
-use actcheck_data::{Role, Scene};
+use actcheck_data::Role;
 use actcheck_facts::thing_iri;
-
-/// Local names of the terms for sensing errors, in the order of [`noise`].
-pub const NOISE_TERMS: [&str; 13] = [
-    "positionNoise",
-    "heightNoise",
-    "yawNoise",
-    "sizeNoise",
-    "localisationNoise",
-    "headingNoise",
-    "gripperNoise",
-    "rangeNoise",
-    "odometryDrift",
-    "odometryHeadingDrift",
-    "landmarkDistance",
-    "landmarkNoise",
-    "landmarkHeadingNoise",
-];
-
-/// Returns the sensing errors of a scene, most of them standard deviations, with the local names of
-/// their terms. Units: those of the terms.
-pub fn noise(scene: &Scene) -> [(&'static str, f64); 13] {
-    let sensing = &scene.sensing;
-    let odometry = &sensing.odometry;
-    let values = [
-        sensing.position_noise_m,
-        sensing.height_noise_m,
-        sensing.yaw_noise_rad,
-        sensing.size_noise_m,
-        sensing.localisation_noise_m,
-        sensing.heading_noise_rad,
-        sensing.gripper_noise_m,
-        sensing.camera.range_noise_m,
-        odometry.drift,
-        odometry.heading_drift,
-        odometry.landmark_every_m,
-        odometry.landmark_noise_m,
-        odometry.landmark_noise_rad,
-    ];
-    std::array::from_fn(|idx| (NOISE_TERMS[idx], values[idx]))
-}
 
 /// Writes the scene of a run: values of the whole scene on the run's node, and one node for each
 /// object.

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::campaign::CampaignRuns;
 use crate::campaign_state::CampaignState;
-use crate::history::{place_of, run_id};
+use crate::ids::{place_of, run_id};
 use crate::merge::plan::{MergePlan, PlannedEnd, PlannedMerge};
 use crate::merge::survey::identity;
 use crate::segment::{LaterJudgement, RunContent, Segment, SegmentColumn, copy_column};
@@ -217,7 +217,7 @@ impl Writer<'_> {
             let new = to.new_file(&new).map_err(unwritten)?;
             let writer = new.writer().map_err(unwritten)?;
             copy_column(&from, &old, column, end, writer)
-                .map_err(|why| fault::segment(&history.stored.folder, &old, &why))?
+                .map_err(|why| fault::segment(history.dir(), &old, &why))?
                 .map_err(unwritten)?;
             files.push(new);
         }
@@ -241,7 +241,8 @@ impl Writer<'_> {
         };
         let history = &self.sources[source];
         let id = run_id(&runs.id, index);
-        let unread = |column| move |why| fault::run(&history.stored.folder, &id, run, column, &why);
+        let unread =
+            |column| move |why| fault::run(history.dir(), &id, &run.segment.file(column), &why);
         let mut stored = run
             .segment
             .run(run.row)

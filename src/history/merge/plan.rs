@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::campaign_state::CampaignState;
-use crate::history::campaign_id;
+use crate::ids::campaign_id;
 use crate::merge::conflict;
 use crate::merge::survey::{Found, FoundRun, survey};
 use crate::{CampaignEnd, History, RunStatus};

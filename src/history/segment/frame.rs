@@ -6,8 +6,11 @@
 //! before its size is used; only a file that ends within a frame has a torn tail.
 
 use std::io::{self, Read, Seek, SeekFrom};
+use std::path::Path;
 
 use flate2::Crc;
+
+use actcheck_base::Below;
 
 /// Size of a file's first bytes. Unit: bytes.
 pub(crate) const HEAD: usize = 8;
@@ -17,6 +20,9 @@ pub(crate) const FRAME_HEADER: usize = 12;
 const MOST_CONTENT: u32 = 1 << 30;
 /// Format of all columns: it increases with every change of the stored values.
 const FORMAT: u8 = b'1';
+
+/// Longest file that is read as a whole, which only the examination of damage does. Unit: bytes.
+const LONGEST: u64 = 16 << 30;
 
 /// The kinds of values of a campaign, each in files of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -271,6 +277,14 @@ pub(crate) fn whole_frames(bytes: &[u8]) -> Vec<(FramePlace, &[u8])> {
         found.extend(frame);
     }
     found
+}
+
+/// Reads a file of a history as a whole.
+///
+/// # Errors
+/// It is missing, far longer than any that this program writes, or can't be read.
+pub(super) fn read_all(below: &Below, path: &Path) -> io::Result<Vec<u8>> {
+    below.read(path, LONGEST)
 }
 
 /// Reads until the buffer is full or the source ends. Returns the number of bytes.

@@ -5,8 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::folder::read_all;
-use crate::segment::frame::{FrameFault, Frames, ReadFault, SegmentColumn, whole_frames};
+use crate::segment::frame::{FrameFault, Frames, ReadFault, SegmentColumn, read_all, whole_frames};
 use crate::segment::packed::{ColumnWriter, packed, path, unpacked};
 use actcheck_base::{Below, Judgement};
 

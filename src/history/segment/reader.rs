@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use crate::RunRow;
 use crate::segment::frame::{
-    FrameFault, FramePlace, Frames, HEAD, ReadFault, SegmentColumn, whole_frames,
+    FrameFault, FramePlace, Frames, HEAD, ReadFault, SegmentColumn, read_all, whole_frames,
 };
 use crate::segment::packed::{ColumnReader, PackedFrame, path};
 use crate::segment::row::{Places, RunEntry, TextTable, decode_row};
 use crate::stored_run::StoredRun;
-use crate::{RunRow, folder};
 use actcheck_base::Below;
 
 /// The key of the next segment.
@@ -116,7 +116,7 @@ impl Segment {
             is_torn: false,
         };
         // The rows that are readable show which runs were stored.
-        let runs = folder::read_all(below, &path(folder, number, SegmentColumn::Runs));
+        let runs = read_all(below, &path(folder, number, SegmentColumn::Runs));
         let (runs, mut texts) = (runs.unwrap_or_default(), TextTable::default());
         let rows = whole_frames(&runs);
         let rows = rows
@@ -366,7 +366,7 @@ fn readable_frames(
     if below.kind(&file).is_none() {
         return Ok(BTreeMap::new());
     }
-    let bytes = folder::read_all(below, &file)?;
+    let bytes = read_all(below, &file)?;
     let mut reader = ColumnReader::open_damaged(below, folder, number, column)?;
     let frames = whole_frames(&bytes).into_iter();
     let readable = frames.filter_map(|(place, content)| {

@@ -4,8 +4,8 @@ mod dataset;
 mod demand;
 
 use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
-use std::sync::{Arc, PoisonError};
 
 use oxigraph::model::{GraphName, NamedNode, Quad};
 
@@ -13,12 +13,12 @@ use crate::campaign::{CampaignRuns, RunAt};
 use crate::campaign_state::CampaignState;
 use crate::campaigns::StoredCampaigns;
 use crate::folder::FolderExtent;
-use crate::history::run_id;
+use crate::ids::run_id;
 use crate::segment::{LaterJudgement, SegmentColumn};
 use crate::statements::{Statements, iri};
 use crate::trace_codec::decode_head;
 use crate::write_run::{RECHECKED, run_node};
-use crate::{History, fault, graphs, write_campaign, write_run};
+use crate::{fault, graphs, write_campaign, write_run};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_facts::{extract, extract_complete};
 
@@ -78,31 +78,19 @@ struct Missing {
     indices: Vec<u64>,
 }
 
-impl History {
-    /// Returns the statements that a query demands, and maybe others.
-    ///
-    /// # Errors
-    /// `H030` these are too many; a file is damaged or can't be read.
-    pub(crate) fn dataset(&self, demand: Demand) -> Result<Arc<Dataset>, Diagnostics> {
-        let source = RunSource {
-            stored: &self.stored,
-            threads: self.threads(),
-        };
-        let mut view = self.view.lock().unwrap_or_else(PoisonError::into_inner);
-        view.dataset(source, demand)
-    }
-}
-
 impl View {
-    /// Returns the demanded statements, and maybe others.
+    /// Returns the demanded statements, and maybe others. `threads`: the greatest number of threads
+    /// that make them.
     ///
     /// # Errors
     /// `H030` these are too many; a file is damaged or can't be read.
-    fn dataset(
+    pub(crate) fn dataset(
         &mut self,
-        source: RunSource<'_>,
+        stored: &StoredCampaigns,
+        threads: usize,
         demand: Demand,
     ) -> Result<Arc<Dataset>, Diagnostics> {
+        let source = RunSource { stored, threads };
         let extent = source.stored.extent()?;
         if self.extent != extent || source.stored.is_salvaged() {
             self.follow(source)?;
@@ -357,8 +345,9 @@ impl<'s> StatementMaker<'s> {
         let rechecked = iri(RECHECKED);
         let mut made = RunStatements::default();
         if demand.has_details_of(&node, rechecked.as_str()) {
+            let dir = self.stored.folder.dir();
             let unread =
-                |why| fault::run(&self.stored.folder, &id, run, SegmentColumn::Details, &why);
+                |why| fault::run(dir, &id, &run.segment.file(SegmentColumn::Details), &why);
             let stored = run.segment.run(run.row).map_err(unread)?;
             let mut statements = Statements::new(demand);
             write_run::write(&stored, self.campaign, &mut statements);
@@ -386,12 +375,12 @@ impl<'s> StatementMaker<'s> {
         facts: WithFacts,
         made: &mut RunStatements,
     ) -> Result<(), Diagnostics> {
-        let folder = &self.stored.folder;
-        let unread = |why| fault::run(folder, id, run, SegmentColumn::States, &why);
+        let dir = self.stored.folder.dir();
+        let file = run.segment.file(SegmentColumn::States);
+        let unread = |why| fault::run(dir, id, &file, &why);
         let states = run.segment.states(run.row);
-        let (_, trace) = decode_head(&states.map_err(unread)?).map_err(|why| {
-            fault::undecodable(folder, id, run, SegmentColumn::States, &why.to_string())
-        })?;
+        let (_, trace) = decode_head(&states.map_err(unread)?)
+            .map_err(|why| fault::undecodable(dir, id, &file, &why.to_string()))?;
         let node = run_node(id);
         let quads = match facts {
             WithFacts::Complete => graphs::complete(&extract_complete(&trace), &node),
