@@ -8,7 +8,7 @@
 //!
 //! ```text
 //! config → scenario → world → actions → facts → rules → verdict → history → analysis → report
-//!  TOML    choices   physics  motion     RDF   Datalog  outcomes  RDF store  polars    text, JSON
+//!  TOML    choices   physics  motion     RDF   Datalog  outcomes  segments   polars    text, JSON
 //!                                            + SPARQL
 //! ```
 //!

@@ -2,7 +2,7 @@
 //! can't exhaust memory before that.
 //!
 //! The evaluator checks whether it was cancelled only when it reads the store. A query is light if
-//! every part of it reads the store all the time (patterns joined by shared variables, not products
+//! every part of it reads statements all the time (patterns joined by shared variables, not products
 //! or hash joins), and if no expression makes a term longer than the terms of the store. Sorting
 //! and grouping then hold only rows that were read.
 
@@ -198,7 +198,7 @@ fn is_small(aggregate: &AggregateExpression) -> bool {
     }
 }
 
-/// Whether the value of an expression is at most as long as a term of the store or of the query.
+/// Whether the value of an expression is at most as long as a term of a statement or of the query.
 fn is_bounded(expression: &Expression) -> bool {
     use Expression as E;
     let itself = match expression {

@@ -1,11 +1,11 @@
-//! Converts our terms to the store's and back.
+//! Converts our terms to oxigraph's and back.
 
 use oxigraph::model::vocab::{rdf, xsd};
 use oxigraph::model::{BlankNode, Literal, NamedNode, Term as StoreTerm};
 
 use actcheck_base::Term;
 
-/// Converts a term to the store's type.
+/// Converts a term to oxigraph's type.
 pub(super) fn to_store(term: &Term) -> StoreTerm {
     match term {
         Term::Iri(iri) => NamedNode::new_unchecked(iri.as_ref()).into(),
@@ -25,7 +25,7 @@ pub(super) fn to_store(term: &Term) -> StoreTerm {
     }
 }
 
-/// Converts a term of the store to ours. An invalid number, or one that is too large, remains a
+/// Converts a term of oxigraph to ours. An invalid number, or one that is too large, remains a
 /// literal with its datatype.
 pub(super) fn from_store(term: &StoreTerm) -> Term {
     match term {

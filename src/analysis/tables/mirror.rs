@@ -101,7 +101,7 @@ pub struct MirrorChange {
 
 impl Mirror {
     /// Updates the mirror of a history: writes missing runs, and rewrites files that are damaged,
-    /// hold runs that the store lacks, or are older than a recheck. If the folder of the history is
+    /// hold runs that the history lacks, or are older than a recheck. If the folder of the history is
     /// read-only, missing runs are written into a temporary folder, which is removed with the
     /// returned value.
     ///
@@ -123,8 +123,8 @@ impl Mirror {
         Self::updated(history, &tables_of(history), true)
     }
 
-    /// Returns the files of a history's mirror that are damaged or differ from the store and the
-    /// traces, sorted by name. Files of runs that the store no longer has, and from before a
+    /// Returns the files of a history's mirror that are damaged or differ from the
+    /// runs, sorted by name. Files of runs that the history no longer has, and from before a
     /// recheck are not compared: an update replaces them.
     ///
     /// # Errors

@@ -5,7 +5,7 @@
 //! read much faster than the store. Store and traces are authoritative; the mirror can be rebuilt
 //! from them at any time.
 //!
-//! Never: changes the store, holds data that the store and the traces lack, or reads a mirror that
+//! Never: changes runs, holds data that the segments lack, or reads a mirror that
 //! lacks runs of the store.
 
 mod adopt;
