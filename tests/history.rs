@@ -2,7 +2,7 @@
 //! is reported clearly.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -194,6 +194,24 @@ pub fn sample_run(campaign: &str, index: u64) -> RunRecord {
         wall_secs: 1.25,
         elapsed_secs: 2.5,
     }
+}
+
+/// The folder of a history of the campaign `k`, which has not ended, as its owner left it when it
+/// was killed. `commit` stores a run.
+pub fn left_by_a_kill(runs: u64, commit: impl Fn(&History, &RunRecord)) -> (TempDir, PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let (live, left) = (folder.path().join("live"), folder.path().join("left"));
+    let history = History::open(&live).unwrap();
+    history.begin_campaign(&sample_campaign("k", 0)).unwrap();
+    (0..runs).for_each(|index| commit(&history, &sample_run("k", index)));
+    copy(&live, &left);
+    (folder, left)
+}
+
+/// The ids of all runs of a history.
+pub fn run_ids(history: &History) -> Vec<String> {
+    let runs = history.runs(&RunFilter::default()).unwrap().into_iter();
+    runs.map(|run| run.run).collect()
 }
 
 /// A campaign that began in a given minute.

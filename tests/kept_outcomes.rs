@@ -8,7 +8,7 @@ use actcheck::history::{CampaignEnd, History, RunFilter, RunRecord};
 use tempfile::TempDir;
 
 use crate::fuzz_corpus::entrances::frames;
-use crate::history::{sample_campaign, sample_run};
+use crate::history::{left_by_a_kill, run_ids, sample_campaign, sample_run};
 use crate::support::exported::{Exported, statements};
 use crate::support::{actcheck, copy, edit, project, stderr, stdout};
 
@@ -176,23 +176,11 @@ fn queries_see_kept_outcomes_and_their_facts() {
 
 /// A history of runs kept as outcomes in the state in which a killed process left it.
 fn killed(runs: u64) -> (TempDir, PathBuf) {
-    let folder = tempfile::tempdir().unwrap();
-    let (live, left) = (folder.path().join("live"), folder.path().join("left"));
-    let history = History::open(&live).unwrap();
-    history.begin_campaign(&sample_campaign("k", 0)).unwrap();
-    (0..runs).for_each(|index| history.commit_outcomes(&sample_run("k", index)).unwrap());
-    copy(&live, &left);
-    (folder, left)
+    left_by_a_kill(runs, |history, run| history.commit_outcomes(run).unwrap())
 }
 
 fn ids(dir: &Path) -> Vec<String> {
-    let history = History::open_to_read(dir).unwrap();
-    history
-        .runs(&RunFilter::default())
-        .unwrap()
-        .into_iter()
-        .map(|run| run.run)
-        .collect()
+    run_ids(&History::open_to_read(dir).unwrap())
 }
 
 #[test]

@@ -10,6 +10,7 @@ use std::time::Duration;
 
 use actcheck::history::{History, RunFilter};
 
+use crate::history::run_ids;
 use crate::support::planted::Dice;
 use crate::support::{actcheck, copy_made_history, root, stderr, stdout};
 
@@ -37,12 +38,7 @@ fn ids(dir: &Path) -> Vec<String> {
     let Ok(history) = History::open_to_read(dir) else {
         return Vec::new();
     };
-    history
-        .runs(&RunFilter::default())
-        .unwrap()
-        .into_iter()
-        .map(|run| run.run)
-        .collect()
+    run_ids(&history)
 }
 
 /// The digests of the traces in a history that is intact.

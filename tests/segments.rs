@@ -5,29 +5,23 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
+use actcheck::base::Term;
 use actcheck::history::merge::{MergeOptions, carry_out, plan};
 use actcheck::history::{CampaignEnd, History, QueryAnswer, RunFilter, RunStatus};
 use tempfile::TempDir;
 
 use crate::facts::sample_trace;
 use crate::fuzz_corpus::entrances::frames;
-use crate::history::{sample_campaign, sample_run};
+use crate::history::{left_by_a_kill, run_ids, sample_campaign, sample_run};
 use crate::support::exported::{Exported, statements};
 use crate::support::{actcheck, copy, stderr, stdout};
 
 /// The columns of a segment in which every run has a frame.
 const COLUMNS: [&str; 4] = ["runs", "details", "states", "motion"];
 
-/// The folder of a history with a campaign that has not ended, as its owner left it when it was
-/// killed.
+/// A history of runs that are kept whole in the state in which a killed process left it.
 fn killed(runs: u64) -> (TempDir, PathBuf) {
-    let folder = tempfile::tempdir().unwrap();
-    let (live, left) = (folder.path().join("live"), folder.path().join("left"));
-    let history = History::open(&live).unwrap();
-    history.begin_campaign(&sample_campaign("k", 0)).unwrap();
-    (0..runs).for_each(|index| history.commit(&sample_run("k", index)).unwrap());
-    copy(&live, &left);
-    (folder, left)
+    left_by_a_kill(runs, |history, run| history.commit(run).unwrap())
 }
 
 fn end() -> CampaignEnd {
@@ -40,15 +34,6 @@ fn end() -> CampaignEnd {
 /// A column of the first segment of the campaign `k`.
 fn column(history: &Path, extension: &str) -> PathBuf {
     history.join("campaigns/k/0001").with_extension(extension)
-}
-
-fn runs(history: &History) -> Vec<String> {
-    history
-        .runs(&RunFilter::default())
-        .unwrap()
-        .into_iter()
-        .map(|run| run.run)
-        .collect()
 }
 
 /// The ids of the first runs of the campaign `k`.
@@ -120,15 +105,15 @@ fn the_next_owner_has_the_runs_of_a_killed_one_and_writes_a_segment_of_its_own()
     add_frames(&column(&left, "details"), 1, 5);
     let files = contents(&left);
     let reader = History::open_to_read(&left).unwrap();
-    assert_eq!((runs(&reader), is_warned(&reader)), (first(3), false));
+    assert_eq!((run_ids(&reader), is_warned(&reader)), (first(3), false));
     assert_eq!(statements(&reader), before);
     drop(reader);
     let history = History::open(&left).unwrap();
-    assert_eq!(runs(&history), first(3));
+    assert_eq!(run_ids(&history), first(3));
     assert_eq!(statements(&history), before);
     history.commit(&sample_run("k", 3)).unwrap();
     history.commit_outcomes(&sample_run("k", 4)).unwrap();
-    assert_eq!(runs(&history), first(5));
+    assert_eq!(run_ids(&history), first(5));
     drop(history);
     // Nothing that was written before has changed, except the campaign itself.
     let now = contents(&left);
@@ -145,7 +130,7 @@ fn the_next_owner_has_the_runs_of_a_killed_one_and_writes_a_segment_of_its_own()
         .begin_campaign(&sample_campaign("later", 1))
         .unwrap();
     history.finish_campaign("k", &end()).unwrap();
-    assert_eq!(runs(&history), first(5));
+    assert_eq!(run_ids(&history), first(5));
     for index in 0..4 {
         let trace = history.traces().whole(&format!("k-{}", index + 1)).unwrap();
         assert_eq!(trace, sample_trace(index));
@@ -177,7 +162,7 @@ fn a_torn_tail_is_not_a_run() {
         let complete = ends.iter().filter(|end| **end <= length).count();
         let is_border = length == frames::HEAD || ends.contains(&length);
         let reader = History::open_to_read(&left).unwrap();
-        assert_eq!(runs(&reader), first(complete), "{length} bytes");
+        assert_eq!(run_ids(&reader), first(complete), "{length} bytes");
         // A process that is killed between two files leaves one run without a frame in the list.
         let is_lost = !is_border || complete < 2;
         assert_eq!(is_warned(&reader), is_lost, "{length} bytes");
@@ -190,10 +175,10 @@ fn a_torn_tail_is_not_a_run() {
     let length = ends[2] - 1;
     std::fs::write(&file, &whole[..length]).unwrap();
     let history = History::open_existing(&left).unwrap();
-    assert_eq!((runs(&history), is_warned(&history)), (first(2), true));
+    assert_eq!((run_ids(&history), is_warned(&history)), (first(2), true));
     history.commit(&sample_run("k", 2)).unwrap();
     history.finish_campaign("k", &end()).unwrap();
-    assert_eq!(runs(&history), first(3));
+    assert_eq!(run_ids(&history), first(3));
     drop(history);
     let (found, history) = History::examine(&left).unwrap();
     assert_eq!((found.damage, found.runs), (Vec::new(), 3));
@@ -214,10 +199,10 @@ fn a_torn_tail_of_a_running_process_gives_no_warning() {
     let whole = std::fs::read(&file).unwrap();
     std::fs::write(&file, &whole[..whole.len() - 3]).unwrap();
     let reader = History::open_to_read(&dir).unwrap();
-    assert_eq!((runs(&reader), is_warned(&reader)), (first(2), false));
+    assert_eq!((run_ids(&reader), is_warned(&reader)), (first(2), false));
     drop(owner);
     let reader = History::open_to_read(&dir).unwrap();
-    assert_eq!((runs(&reader), is_warned(&reader)), (first(2), true));
+    assert_eq!((run_ids(&reader), is_warned(&reader)), (first(2), true));
 }
 
 /// A process that is killed leaves one run of which only some columns have a frame. Two such runs
@@ -231,14 +216,14 @@ fn frames_without_a_run_are_harmless_or_a_lost_run() {
         }
         let before = contents(&left);
         let reader = History::open_to_read(&left).unwrap();
-        assert_eq!((runs(&reader), is_warned(&reader)), (first(3), is_lost));
+        assert_eq!((run_ids(&reader), is_warned(&reader)), (first(3), is_lost));
         let (found, _) = History::examine(&left).unwrap();
         assert_eq!(found.damage.is_empty(), !is_lost, "{found:?}");
         let unfinished = [PathBuf::from("campaigns/k/0001.runs")];
         assert!(is_lost || found.unfinished == unfinished, "{found:?}");
         assert_eq!(contents(&left), before, "readers change nothing");
         let owner = History::open_existing(&left).unwrap();
-        assert_eq!((runs(&owner), is_warned(&owner)), (first(3), is_lost));
+        assert_eq!((run_ids(&owner), is_warned(&owner)), (first(3), is_lost));
     }
 }
 
@@ -317,7 +302,7 @@ fn a_campaign_that_was_never_recorded_is_none() {
         }
         let reader = History::open_to_read(&left).unwrap();
         assert_eq!(reader.campaigns().unwrap().len(), 1, "{leftover:?}");
-        assert_eq!(runs(&reader), first(3), "{leftover:?}");
+        assert_eq!(run_ids(&reader), first(3), "{leftover:?}");
         assert_eq!(History::count_runs(&left), 3);
         let owner = History::open_existing(&left).unwrap();
         owner.begin_campaign(&sample_campaign("q", 3)).unwrap();
@@ -325,7 +310,7 @@ fn a_campaign_that_was_never_recorded_is_none() {
         drop(owner);
         let reader = History::open_to_read(&left).unwrap();
         assert_eq!(reader.campaigns().unwrap().len(), 2, "{leftover:?}");
-        assert_eq!(runs(&reader).len(), 4, "{leftover:?}");
+        assert_eq!(run_ids(&reader).len(), 4, "{leftover:?}");
         let (found, _) = History::examine(&left).unwrap();
         assert!(found.damage.is_empty(), "{leftover:?}: {found:?}");
     }
@@ -345,7 +330,7 @@ fn reopening_a_campaign_removes_a_torn_tail() {
     owner.commit(&sample_run("k", 2)).unwrap();
     drop(owner);
     let reader = History::open_to_read(&left).unwrap();
-    assert_eq!((runs(&reader), is_warned(&reader)), (first(3), false));
+    assert_eq!((run_ids(&reader), is_warned(&reader)), (first(3), false));
     assert_eq!(reader.traces().whole("k-3").unwrap(), sample_trace(2));
 }
 
@@ -358,7 +343,7 @@ fn an_empty_history_has_empty_lists() {
     assert_eq!(version, "actcheck history 5\n");
     let reader = History::open_to_read(&dir).unwrap();
     let all = RunFilter::default();
-    assert_eq!((runs(&reader).len(), History::count_runs(&dir)), (0, 0));
+    assert_eq!((run_ids(&reader).len(), History::count_runs(&dir)), (0, 0));
     assert!(reader.campaigns().unwrap().is_empty() && reader.outcomes(&all).unwrap().is_empty());
     assert!(statements(&reader).is_empty() && !is_warned(&reader));
     assert_eq!(
@@ -381,7 +366,7 @@ fn salvaged(folder: &Path, left: &Path) -> (Vec<String>, Option<bool>, String) {
         stderr(&output)
     );
     let saved = History::open_to_read(&folder.join("saved")).unwrap();
-    let ids = runs(&saved);
+    let ids = run_ids(&saved);
     for run in &ids {
         let index = saved.run(run).unwrap().row.index;
         assert_eq!(saved.run(run).unwrap().actions[0].judgements.len(), 5);
@@ -437,7 +422,7 @@ fn damage_to_a_column_is_reported_and_the_other_runs_are_saved() {
             // Others are not concerned.
             if extension != "runs" {
                 let history = History::open_to_read(&left).unwrap();
-                assert_eq!(runs(&history), first(3));
+                assert_eq!(run_ids(&history), first(3));
                 assert_eq!(history.traces().whole("k-2").unwrap(), sample_trace(1));
                 assert_eq!(history.run("k-2").unwrap().actions.len(), 1);
             }
@@ -481,7 +466,7 @@ fn runs_whose_frames_are_missing_are_reported() {
                 None => std::fs::remove_file(&file).unwrap(),
             }
             let history = History::open_to_read(&left).unwrap();
-            assert_eq!(runs(&history), first(3));
+            assert_eq!(run_ids(&history), first(3));
             let read = history
                 .run("k-3")
                 .map(drop)
@@ -625,6 +610,43 @@ fn lines(answer: QueryAnswer) -> Vec<String> {
 fn answer(history: &History, query: &str) -> Vec<String> {
     let answer = history.query(query);
     lines(answer.unwrap_or_else(|fault| panic!("{query}: {fault}")))
+}
+
+/// The statements that queries needed before follow the history, also if it lost some.
+#[test]
+fn a_view_follows_a_history_that_grows_and_shrinks() {
+    let (_folder, left) = killed(3);
+    let rows = std::fs::read(column(&left, "runs")).unwrap();
+    let reader = History::open_to_read(&left).unwrap();
+    let count = |query: &str| match reader.query(query).unwrap() {
+        QueryAnswer::Table { rows, .. } => format!("{:?}", rows[0][0]),
+        other => panic!("{other:?}"),
+    };
+    let counts = || {
+        reader.refresh().unwrap();
+        [
+            count("SELECT (COUNT(*) AS ?n) { ?run a act:Run }"),
+            count("SELECT (COUNT(*) AS ?n) { ?campaign prov:endedAtTime ?at }"),
+        ]
+    };
+    let are = |runs: i64, ends: i64| [runs, ends].map(|n| format!("{:?}", Some(Term::Integer(n))));
+    assert_eq!(counts(), are(3, 0));
+    let owner = History::open(&left).unwrap();
+    (3..5).for_each(|index| owner.commit(&sample_run("k", index)).unwrap());
+    assert_eq!(counts(), are(5, 0));
+    owner.finish_campaign("k", &end()).unwrap();
+    assert_eq!(counts(), are(5, 1));
+    owner.reopen_campaign("k").unwrap();
+    assert_eq!(counts(), are(5, 0));
+    drop(owner);
+    // Damage from outside: the file of the campaign knows of no run yet.
+    let (_other, alone) = killed(3);
+    std::fs::remove_dir_all(left.join("campaigns/k")).unwrap();
+    assert_eq!(counts(), are(0, 0));
+    copy(&alone.join("campaigns"), &left.join("campaigns"));
+    assert_eq!(counts(), are(3, 0));
+    std::fs::write(column(&left, "runs"), &rows[..rows.len() - 1]).unwrap();
+    assert_eq!(counts(), are(2, 0));
 }
 
 /// Queries with every kind of pattern.

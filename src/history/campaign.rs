@@ -1,6 +1,7 @@
 //! The runs of a campaign at one moment, from all its segments.
 
 use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
 
 use crate::folder::{CampaignExtent, Folder};
 use crate::segment::{
@@ -23,7 +24,7 @@ pub(crate) struct CampaignRuns {
     /// Number of batches of judgements in each segment that has some.
     pub batches: HashMap<u32, u64>,
     /// Paths of files that end within a frame.
-    pub torn: Vec<std::path::PathBuf>,
+    pub torn: Vec<PathBuf>,
 }
 
 /// The place of a run.
@@ -51,33 +52,49 @@ impl CampaignRuns {
         id: &str,
         extent: &CampaignExtent,
     ) -> Result<Self, Diagnostics> {
+        Self::read_with(folder, id, extent, |file, fault| {
+            Err(fault::segment(folder.dir(), file, fault))
+        })
+    }
+
+    /// Reads the rows of a campaign. Calls `on_fault` with each file that can't be read, and goes on
+    /// without it unless that returns an error.
+    ///
+    /// # Errors
+    /// Those of `on_fault`.
+    pub(crate) fn read_with(
+        folder: &Folder,
+        id: &str,
+        extent: &CampaignExtent,
+        mut on_fault: impl FnMut(&Path, &ReadFault) -> Result<(), Diagnostics>,
+    ) -> Result<Self, Diagnostics> {
         let (below, dir) = (folder.below(), folder.campaign(id));
         let mut runs = Self {
             id: id.to_owned(),
             ..Self::default()
         };
-        let unread = |number: u32, column: SegmentColumn, fault: &ReadFault| {
-            let file = dir.join(format!("{number:04}.{}", column.extension()));
-            fault::segment(folder.dir(), &file, fault)
-        };
         for (number, lengths) in &extent.segments {
+            let file =
+                |column: SegmentColumn| dir.join(format!("{number:04}.{}", column.extension()));
             if let Some(length) = lengths.runs {
-                let segment = Segment::open(&below, &dir, *number, length)
-                    .map_err(|fault| unread(*number, SegmentColumn::Runs, &fault))?;
-                if segment.is_torn() {
-                    runs.torn.push(segment.file(SegmentColumn::Runs));
+                match Segment::open(&below, &dir, *number, length) {
+                    Ok(segment) => {
+                        runs.torn
+                            .extend(segment.is_torn().then(|| file(SegmentColumn::Runs)));
+                        runs.segments.push(segment);
+                    }
+                    Err(fault) => on_fault(&file(SegmentColumn::Runs), &fault)?,
                 }
-                runs.segments.push(segment);
             }
             if let Some(length) = lengths.judgements {
-                let column = SegmentColumn::Judgements;
-                let (later, batches, is_torn) = read_judgements(&below, &dir, *number, length)
-                    .map_err(|fault| unread(*number, column, &fault))?;
-                runs.later.extend(later);
-                runs.batches.insert(*number, batches);
-                if is_torn {
-                    let name = format!("{number:04}.{}", column.extension());
-                    runs.torn.push(dir.join(name));
+                match read_judgements(&below, &dir, *number, length) {
+                    Ok((later, batches, is_torn)) => {
+                        runs.later.extend(later);
+                        runs.batches.insert(*number, batches);
+                        runs.torn
+                            .extend(is_torn.then(|| file(SegmentColumn::Judgements)));
+                    }
+                    Err(fault) => on_fault(&file(SegmentColumn::Judgements), &fault)?,
                 }
             }
         }

@@ -9,7 +9,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::segment::{
-    FrameFault, Frames, HEAD, ReadFault, SegmentColumn, packed, put, unpacked, whole_frames,
+    FrameFault, Frames, HEAD, ReadFault, SegmentColumn, WholeFrames, packed, put, unpacked,
 };
 use crate::{CampaignEnd, CampaignRecord};
 use actcheck_base::Below;
@@ -78,12 +78,13 @@ impl CampaignState {
     /// # Errors
     /// The file can't be read.
     pub(crate) fn salvage(below: &Below, folder: &Path, id: &str) -> io::Result<Option<Self>> {
-        let bytes = below.read(&path(folder), LONGEST)?;
-        let frames = whole_frames(&bytes);
-        let mut states = frames
-            .into_iter()
-            .filter_map(|(_, content)| Self::decode(content, id));
-        Ok(states.next())
+        let mut frames = WholeFrames::open(below, &path(folder))?;
+        while let Some((_, content)) = frames.next()? {
+            if let Some(state) = Self::decode(&content, id) {
+                return Ok(Some(state));
+            }
+        }
+        Ok(None)
     }
 
     /// Campaigns are known by the names of their folders alone.

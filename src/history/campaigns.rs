@@ -123,7 +123,7 @@ impl StoredCampaigns {
         }
     }
 
-    /// A campaign without its runs. Returns `None` if there is no such campaign.
+    /// A campaign without its runs. Returns `None` if the history has none with this id.
     pub(crate) fn state_of(&self, id: &str) -> Result<Option<Arc<CampaignState>>, Diagnostics> {
         if let Some(salvaged) = &self.salvaged {
             return Ok(salvaged.get(id).map(|(state, _)| Arc::clone(state)));
@@ -220,7 +220,8 @@ impl StoredCampaigns {
         Ok(states)
     }
 
-    /// Calls `read` with a run, by its id. Returns `None` if there is no such run.
+    /// Calls `read` with a run, by its id. Returns `None` if the history has none with
+    /// this id.
     pub(crate) fn with_run<T>(
         &self,
         id: &str,

@@ -131,7 +131,7 @@ fn missing(dir: &Path, file: &Path) -> Diagnostics {
         .into()
 }
 
-/// H008: there is no such run.
+/// H008: the history has no run with this name.
 pub(super) fn no_run(dir: &Path, name: &str) -> Diagnostics {
     let message = format!("the history `{}` has no run `{name}`", dir.display());
     Diagnostic::error("H008", message)

@@ -172,7 +172,7 @@ impl Folder {
         Ok(FolderExtent { campaigns })
     }
 
-    /// The files of a campaign at this moment. Returns `None` if there is no such campaign, or if
+    /// The files of a campaign at this moment. Returns `None` if the history has none with this id, or if
     /// it is just being created.
     ///
     /// # Errors

@@ -160,7 +160,7 @@ impl History {
     /// Returns the record of a campaign.
     ///
     /// # Errors
-    /// `H014` there is no such campaign.
+    /// `H014` the history has no campaign with this id.
     pub fn campaign(&self, id: &str) -> Result<CampaignRecord, Diagnostics> {
         if let Some(state) = self.stored.state_of(id)? {
             return Ok(state.record.clone());
@@ -235,7 +235,7 @@ impl History {
     /// Returns all details of a run, named as in [`History::resolve`].
     ///
     /// # Errors
-    /// `H008` there is no such run.
+    /// `H008` the history has no run with this name.
     pub fn run(&self, name: &str) -> Result<RunDetail, Diagnostics> {
         let id = self.resolve(name)?;
         let detail = self.stored.with_run(&id, |campaign, run| {
@@ -302,7 +302,7 @@ impl History {
     /// left.
     ///
     /// # Errors
-    /// Writing failed: `H005`, `H006`; `H014` there is no such campaign.
+    /// Writing failed: `H005`, `H006`; `H014` the history has no campaign with this id.
     pub fn reopen_campaign(&self, id: &str) -> Result<(), Diagnostics> {
         self.stored.remove_torn_tails(id)?;
         self.change_state(id, |state| state.end = None)
@@ -311,7 +311,7 @@ impl History {
     /// Writes the end of a campaign, and flushes everything to the disk.
     ///
     /// # Errors
-    /// Writing failed: `H005`, `H006`; `H014` there is no such campaign.
+    /// Writing failed: `H005`, `H006`; `H014` the history has no campaign with this id.
     pub fn finish_campaign(&self, id: &str, end: &CampaignEnd) -> Result<(), Diagnostics> {
         self.segments.close(&self.stored.folder, id)?;
         self.change_state(id, |state| state.end = Some(end.clone()))

@@ -9,7 +9,7 @@ use crate::campaign_state::CampaignState;
 use crate::campaigns::StoredCampaigns;
 use crate::folder::{CampaignExtent, Folder};
 use crate::ids::run_id;
-use crate::segment::{ReadFault, Segment, SegmentColumn, read_judgements, salvage_judgements};
+use crate::segment::{ReadFault, Segment, SegmentColumn, salvage_judgements};
 use crate::trace_codec::{decode_head, decode_motion};
 use crate::{History, fault};
 use actcheck_base::Diagnostics;
@@ -83,44 +83,15 @@ impl History {
                 None
             }
         };
-        let mut runs = CampaignRuns::default();
-        id.clone_into(&mut runs.id);
-        for (number, lengths) in &extent.segments {
-            let file =
-                |column: SegmentColumn| folder.join(format!("{number:04}.{}", column.extension()));
-            if let Some(length) = lengths.runs {
-                match Segment::open(&below, &folder, *number, length) {
-                    Ok(segment) => {
-                        if segment.is_torn() {
-                            runs.torn.push(segment.file(SegmentColumn::Runs));
-                        }
-                        runs.segments.push(segment);
-                    }
-                    Err(why) => found.damage.push(Damage {
-                        file: relative(&file(SegmentColumn::Runs)),
-                        run: None,
-                        reason: why.to_string(),
-                    }),
-                }
-            }
-            if let Some(length) = lengths.judgements {
-                match read_judgements(&below, &folder, *number, length) {
-                    Ok((later, batches, is_torn)) => {
-                        runs.later.extend(later);
-                        runs.batches.insert(*number, batches);
-                        if is_torn {
-                            runs.torn.push(file(SegmentColumn::Judgements));
-                        }
-                    }
-                    Err(why) => found.damage.push(Damage {
-                        file: relative(&file(SegmentColumn::Judgements)),
-                        run: None,
-                        reason: why.to_string(),
-                    }),
-                }
-            }
-        }
-        runs.sort();
+        let damage = &mut found.damage;
+        let runs = CampaignRuns::read_with(&self.stored.folder, id, extent, |file, why| {
+            damage.push(Damage {
+                file: relative(file),
+                run: None,
+                reason: why.to_string(),
+            });
+            Ok(())
+        })?;
         found.runs += runs.len();
         for run in runs.iter() {
             for column in SegmentColumn::OF_RUNS {
@@ -140,22 +111,22 @@ impl History {
                 reason: "it is shorter than it was".to_owned(),
             });
         }
+        // The file of a campaign that has ended says how many runs it has.
+        if state.as_ref().is_some_and(|state| state.end.is_some()) {
+            return Ok(());
+        }
         let is_locked = self.stored.folder.is_locked();
         for tail in self.torn_tails(&runs)? {
-            let is_lost = tail.without_row.len() > 1
-                && !is_locked
-                && state.as_ref().is_none_or(|state| state.end.is_none());
-            if is_lost {
+            let file = relative(&tail.file);
+            let count = tail.without_row.len();
+            if count > 1 && !is_locked {
                 found.damage.push(Damage {
-                    file: relative(&tail.file),
+                    file,
                     run: None,
-                    reason: format!(
-                        "its end is missing: {} runs have values, but no row",
-                        tail.without_row.len()
-                    ),
+                    reason: format!("its end is missing: {count} runs have values, but no row"),
                 });
             } else {
-                found.unfinished.push(relative(&tail.file));
+                found.unfinished.push(file);
             }
         }
         Ok(())

@@ -35,7 +35,7 @@ impl History {
     /// Calls `each` with the health data of every run of a campaign, by index.
     ///
     /// # Errors
-    /// `H014` there is no such campaign; otherwise as [`crate::Traces::whole`].
+    /// `H014` the history has no campaign with this id; otherwise as [`crate::Traces::whole`].
     pub fn each_vitals(
         &self,
         campaign: &str,

@@ -5,7 +5,9 @@
 //! and of the frame's place. A frame that was moved, or whose size was changed, is therefore found
 //! before its size is used; only a file that ends within a frame has a torn tail.
 
+use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
+use std::os::unix::fs::FileExt as _;
 use std::path::Path;
 
 use flate2::Crc;
@@ -21,7 +23,7 @@ const MOST_CONTENT: u32 = 1 << 30;
 /// Format of all columns: it increases with every change of the stored values.
 const FORMAT: u8 = b'1';
 
-/// Longest file that is read as a whole, which only the examination of damage does. Unit: bytes.
+/// Longest file that is searched for whole frames. Unit: bytes.
 const LONGEST: u64 = 16 << 30;
 
 /// The kinds of values of a campaign, each in files of its own.
@@ -261,30 +263,93 @@ impl<R: Read> Frames<R> {
     }
 }
 
-/// All whole frames of a file, also those after damaged ones: a header has the checksum of its own
+/// The whole frames of a damaged file, one after another: a header has the checksum of its own
 /// place, so that the next one is found wherever it begins.
-pub(crate) fn whole_frames(bytes: &[u8]) -> Vec<(FramePlace, &[u8])> {
-    let (mut found, mut at) = (Vec::new(), HEAD.min(bytes.len()));
-    while let Some(head) = bytes[at..].first_chunk::<FRAME_HEADER>() {
-        let frame = place_of(at as u64, *head).ok().and_then(|place| {
-            let content = content_of(place, &bytes[at..]).ok()?;
-            Some((place, content))
-        });
-        at += match frame {
-            Some((place, _)) => FRAME_HEADER + place.size as usize,
-            None => 1,
-        };
-        found.extend(frame);
-    }
-    found
+#[derive(Debug)]
+pub(crate) struct WholeFrames {
+    file: File,
+    at: u64,
+    end: u64,
+    /// Bytes of the file from `start` on, in which headers are looked for.
+    window: Vec<u8>,
+    start: u64,
 }
 
-/// Reads a file of a history as a whole.
-///
-/// # Errors
-/// It is missing, far longer than any that this program writes, or can't be read.
-pub(super) fn read_all(below: &Below, path: &Path) -> io::Result<Vec<u8>> {
-    below.read(path, LONGEST)
+/// Size of the window. Unit: bytes.
+const WINDOW: usize = 1 << 16;
+
+impl WholeFrames {
+    /// Opens a file.
+    ///
+    /// # Errors
+    /// It is missing, far longer than any that this program writes, or can't be opened.
+    pub(crate) fn open(below: &Below, path: &Path) -> io::Result<Self> {
+        let file = below.open(path)?;
+        let end = file.metadata()?.len();
+        if end > LONGEST {
+            return Err(io::Error::other(
+                "it is far longer than this program writes",
+            ));
+        }
+        Ok(Self {
+            file,
+            at: HEAD as u64,
+            end,
+            window: Vec::new(),
+            start: 0,
+        })
+    }
+
+    /// The next frame and its content. Returns `None` at the end.
+    ///
+    /// # Errors
+    /// The system can't read the file.
+    pub(crate) fn next(&mut self) -> io::Result<Option<(FramePlace, Vec<u8>)>> {
+        while let Some(bytes) = self.header()? {
+            let place = place_of(self.at, bytes).ok();
+            if let Some(place) = place.filter(|place| place.end() <= self.end) {
+                let mut content = vec![0; place.size as usize];
+                self.file
+                    .read_exact_at(&mut content, place.offset + FRAME_HEADER as u64)?;
+                if sum(&[&content]) == place.sum {
+                    self.at = place.end();
+                    return Ok(Some((place, content)));
+                }
+            }
+            self.at += 1;
+            if bytes == [0; FRAME_HEADER] {
+                self.skip_zeros();
+            }
+        }
+        Ok(None)
+    }
+
+    /// The bytes at the present place. Returns `None` if there are too few for a header.
+    fn header(&mut self) -> io::Result<Option<[u8; FRAME_HEADER]>> {
+        if self.at + FRAME_HEADER as u64 > self.end {
+            return Ok(None);
+        }
+        let is_in = |start: u64, length: usize| {
+            (start..=start + length as u64).contains(&self.at)
+                && self.at + FRAME_HEADER as u64 <= start + length as u64
+        };
+        if !is_in(self.start, self.window.len()) {
+            let left = usize::try_from(self.end - self.at).unwrap_or(WINDOW);
+            self.window.resize(left.min(WINDOW), 0);
+            self.start = self.at;
+            self.file.read_exact_at(&mut self.window, self.start)?;
+        }
+        let from = (self.at - self.start) as usize;
+        Ok(self.window[from..].first_chunk().copied())
+    }
+
+    /// Goes on where a header can begin that is not all zeros, as in the holes of a file.
+    fn skip_zeros(&mut self) {
+        let from = (self.at - self.start) as usize;
+        let rest = &self.window[from.min(self.window.len())..];
+        let zeros = rest.iter().take_while(|byte| **byte == 0).count();
+        self.at += zeros.saturating_sub(FRAME_HEADER - 1) as u64;
+    }
 }
 
 /// Reads until the buffer is full or the source ends. Returns the number of bytes.
@@ -325,6 +390,7 @@ pub(crate) fn content_of(place: FramePlace, bytes: &[u8]) -> Result<&[u8], Frame
 #[cfg(test)]
 mod tests {
     use super::*;
+    use actcheck_base::ScratchFolder;
 
     /// A file with three frames, and their places.
     fn file() -> (Vec<u8>, Vec<FramePlace>) {
@@ -391,11 +457,16 @@ mod tests {
     #[test]
     fn frames_after_a_damaged_one_are_found() {
         let (bytes, places) = file();
+        let folder = ScratchFolder::create().expect("a temporary folder");
+        let path = folder.path().join("0001.runs");
         let found = |bytes: &[u8]| -> Vec<FramePlace> {
-            whole_frames(bytes)
-                .iter()
-                .map(|(place, _)| *place)
-                .collect()
+            std::fs::write(&path, bytes).expect("it can be written");
+            let frames = WholeFrames::open(&Below::new(folder.path()), &path);
+            let (mut frames, mut found) = (frames.expect("it is there"), Vec::new());
+            while let Some((place, _)) = frames.next().expect("it can be read") {
+                found.push(place);
+            }
+            found
         };
         assert_eq!(found(&bytes), places);
         for at in HEAD..bytes.len() {
@@ -409,6 +480,13 @@ mod tests {
             assert_eq!(found(&damaged), left, "byte {at}");
         }
         assert_eq!(found(b"act"), []);
+        // After holes of all lengths, also some longer than the window.
+        for hole in (0..30).chain([WINDOW - 7, WINDOW, 3 * WINDOW + 5]) {
+            let mut holed = bytes.clone();
+            holed.extend(vec![0; hole]);
+            let last = put(holed.len() as u64, b"last", &mut holed).expect("it is small");
+            assert_eq!(found(&holed).last(), Some(&last), "{hole} zeros");
+        }
     }
 
     #[test]

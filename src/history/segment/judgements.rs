@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::segment::frame::{FrameFault, Frames, ReadFault, SegmentColumn, read_all, whole_frames};
+use crate::segment::frame::{FrameFault, Frames, ReadFault, SegmentColumn, WholeFrames};
 use crate::segment::packed::{ColumnWriter, packed, path, unpacked};
 use actcheck_base::{Below, Judgement};
 
@@ -88,10 +88,12 @@ pub(crate) fn salvage_judgements(
     folder: &Path,
     number: u32,
 ) -> io::Result<Vec<LaterJudgement>> {
-    let bytes = read_all(below, &path(folder, number, SegmentColumn::Judgements))?;
-    let frames = whole_frames(&bytes).into_iter();
-    let readable = frames.filter_map(|(_, content)| decode_judgements(content));
-    Ok(readable.flatten().collect())
+    let file = path(folder, number, SegmentColumn::Judgements);
+    let (mut frames, mut found) = (WholeFrames::open(below, &file)?, Vec::new());
+    while let Some((_, content)) = frames.next()? {
+        found.extend(decode_judgements(&content).into_iter().flatten());
+    }
+    Ok(found)
 }
 
 /// The judgements of a frame. Returns `None` if its content is none of this program.

@@ -10,7 +10,7 @@ mod reader;
 mod row;
 mod writer;
 
-pub(crate) use frame::{FrameFault, Frames, HEAD, ReadFault, SegmentColumn, put, whole_frames};
+pub(crate) use frame::{FrameFault, Frames, HEAD, ReadFault, SegmentColumn, WholeFrames, put};
 pub(crate) use judgements::{JudgementWriter, LaterJudgement, read_judgements, salvage_judgements};
 pub(crate) use packed::{packed, unpacked};
 pub(crate) use reader::{Segment, indices_after, whole_length};

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::RunRow;
 use crate::segment::frame::{
-    FrameFault, FramePlace, Frames, HEAD, ReadFault, SegmentColumn, read_all, whole_frames,
+    FrameFault, FramePlace, Frames, HEAD, ReadFault, SegmentColumn, WholeFrames,
 };
 use crate::segment::packed::{ColumnReader, PackedFrame, path};
 use crate::segment::row::{Places, RunEntry, TextTable, decode_row};
@@ -116,14 +116,14 @@ impl Segment {
             is_torn: false,
         };
         // The rows that are readable show which runs were stored.
-        let runs = read_all(below, &path(folder, number, SegmentColumn::Runs));
-        let (runs, mut texts) = (runs.unwrap_or_default(), TextTable::default());
-        let rows = whole_frames(&runs);
-        let rows = rows
-            .iter()
-            .filter_map(|(_, content)| decode_row(content, &mut texts).ok());
-        let mut lost: BTreeSet<u64> = rows.map(|row| row.index).collect();
-        lost.extend(states.keys());
+        let mut lost: BTreeSet<u64> = states.keys().copied().collect();
+        let runs = path(folder, number, SegmentColumn::Runs);
+        if below.kind(&runs).is_some() {
+            let (mut frames, mut texts) = (WholeFrames::open(below, &runs)?, TextTable::default());
+            while let Some((_, content)) = frames.next()? {
+                lost.extend(decode_row(&content, &mut texts).map(|row| row.index));
+            }
+        }
         let column = SegmentColumn::Details;
         let mut reader = ColumnReader::open_damaged(below, folder, number, column)?;
         for (index, place) in details {
@@ -366,12 +366,16 @@ fn readable_frames(
     if below.kind(&file).is_none() {
         return Ok(BTreeMap::new());
     }
-    let bytes = read_all(below, &file)?;
+    let mut frames = WholeFrames::open(below, &file)?;
     let mut reader = ColumnReader::open_damaged(below, folder, number, column)?;
-    let frames = whole_frames(&bytes).into_iter();
-    let readable = frames.filter_map(|(place, content)| {
-        let index = PackedFrame::parse(content)?.index;
-        reader.read(index, place).ok().map(|_| (index, place))
-    });
-    Ok(readable.collect())
+    let mut readable = BTreeMap::new();
+    while let Some((place, content)) = frames.next()? {
+        let Some(frame) = PackedFrame::parse(&content) else {
+            continue;
+        };
+        if reader.read(frame.index, place).is_ok() {
+            readable.insert(frame.index, place);
+        }
+    }
+    Ok(readable)
 }

@@ -2,6 +2,8 @@
 
 mod dataset;
 mod demand;
+mod interner;
+mod orders;
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -25,7 +27,7 @@ use actcheck_facts::{extract, extract_complete};
 pub(crate) use dataset::Dataset;
 pub(crate) use demand::Demand;
 
-/// Largest number of statements in memory: they take about three gigabytes.
+/// Largest number of statements in memory: they take about two gigabytes.
 const MOST_STATEMENTS: u64 = 20_000_000;
 /// Number of runs whose statements are counted before those of all runs are made.
 const SAMPLED: usize = 12;
@@ -45,9 +47,9 @@ pub(crate) struct View {
 }
 
 /// The parts of a campaign that are in a view.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Taken {
-    state: Option<Arc<CampaignState>>,
+    state: Arc<CampaignState>,
     /// Number of rows of each segment, by its number.
     rows: BTreeMap<u32, usize>,
     later: usize,
@@ -71,8 +73,9 @@ pub(crate) struct RunStatements {
     graphs: Vec<NamedNode>,
 }
 
-/// Runs of a campaign whose statements are missing in a view.
+/// A campaign, and those of its runs whose statements are missing in a view.
 struct Missing {
+    state: Arc<CampaignState>,
     runs: Arc<CampaignRuns>,
     /// Indices of the runs.
     indices: Vec<u64>,
@@ -98,18 +101,20 @@ impl View {
         }
         let missing = demand.clone().beyond(&self.demand);
         if !missing.is_empty() {
-            let all = source.missing(&HashMap::new())?;
+            let all = source.all()?;
             let count = source.estimate(&all, &missing)?;
-            if count > MOST_STATEMENTS {
-                return Err(too_many(source.stored, count));
-            }
-            if count + self.dataset.len() as u64 > MOST_STATEMENTS {
+            if count + self.dataset.len() as u64 <= MOST_STATEMENTS {
+                self.widen(source, &all, missing)?;
+            } else {
+                // Earlier queries needed the others.
+                let count = source.estimate(&all, &demand)?;
+                if count > MOST_STATEMENTS {
+                    return Err(too_many(source.stored, count));
+                }
                 *self = Self::default();
                 self.follow(source)?;
                 self.extent = extent;
                 self.widen(source, &all, demand)?;
-            } else {
-                self.widen(source, &all, missing)?;
             }
         }
         Ok(Arc::clone(&self.dataset))
@@ -133,32 +138,32 @@ impl View {
 
     /// Adds the statements of runs and judgements that are new since the state that a view shows.
     fn follow(&mut self, source: RunSource<'_>) -> Result<(), Diagnostics> {
-        let states = source.stored.states()?;
-        let is_changed = |state: &Arc<CampaignState>| {
-            let known = self.taken.get(&state.record.id);
-            known
-                .and_then(|taken| taken.state.as_ref())
-                .is_some_and(|before| {
-                    // An end that is added leaves the other statements as they are.
-                    let mut grown = (**before).clone();
-                    grown.end = grown.end.or_else(|| state.end.clone());
-                    grown.segments = state.segments.clone();
-                    grown != **state
-                })
-        };
-        if states.iter().any(is_changed) {
+        let mut present = source.all()?;
+        let known = present
+            .iter()
+            .filter_map(|own| Some((self.taken.get(&own.runs.id)?, own)));
+        let grown = known.filter(|(taken, own)| taken.is_grown_to(own)).count();
+        if grown < self.taken.len() {
             let demand = std::mem::take(&mut self.demand);
             *self = Self {
                 demand,
                 ..Self::default()
             };
         }
-        let missing = source.missing(&self.taken)?;
+        let taken: HashMap<String, Taken> = present
+            .iter()
+            .map(|own| (own.runs.id.clone(), Taken::of(own)))
+            .collect();
         if !self.demand.is_empty() {
+            for own in &mut present {
+                if let Some(taken) = self.taken.get(&own.runs.id) {
+                    own.indices = taken.new_in(&own.runs);
+                }
+            }
             let demand = self.demand.clone();
             let dataset = Arc::make_mut(&mut self.dataset);
             let added = source.add_campaigns(&demand, dataset);
-            let added = added.and_then(|()| source.add_runs(&missing, &demand, dataset));
+            let added = added.and_then(|()| source.add_runs(&present, &demand, dataset));
             dataset.merge_pending();
             if let Err(faults) = added {
                 // It is made anew by the next query.
@@ -166,19 +171,47 @@ impl View {
                 return Err(faults);
             }
         }
-        for state in states {
-            let id = state.record.id.clone();
-            let runs = source.stored.runs_of(&id)?;
-            let rows = runs.segments.iter();
-            let rows = rows.map(|segment| (segment.number(), segment.rows().len()));
-            let taken = Taken {
-                state: Some(state),
-                rows: rows.collect(),
-                later: runs.later.len(),
-            };
-            self.taken.insert(id, taken);
-        }
+        self.taken = taken;
         Ok(())
+    }
+}
+
+impl Taken {
+    fn of(own: &Missing) -> Self {
+        let segments = own.runs.segments.iter();
+        Self {
+            state: Arc::clone(&own.state),
+            rows: segments
+                .map(|segment| (segment.number(), segment.rows().len()))
+                .collect(),
+            later: own.runs.later.len(),
+        }
+    }
+
+    /// Whether a campaign has all that was taken: runs, judgements and an end are only added.
+    fn is_grown_to(&self, own: &Missing) -> bool {
+        let mut grown = (*self.state).clone();
+        grown.end = grown.end.or_else(|| own.state.end.clone());
+        grown.segments.clone_from(&own.state.segments);
+        let present = Self::of(own);
+        let has = |(number, rows): (&u32, &usize)| {
+            present.rows.get(number).is_some_and(|own| own >= rows)
+        };
+        grown == *own.state && self.later <= present.later && self.rows.iter().all(has)
+    }
+
+    /// The indices of the runs that have not been taken, or were judged since.
+    fn new_in(&self, runs: &CampaignRuns) -> Vec<u64> {
+        let mut indices = Vec::new();
+        for segment in &runs.segments {
+            let known = self.rows.get(&segment.number()).copied();
+            let new = segment.rows().iter().skip(known.unwrap_or_default());
+            indices.extend(new.map(|row| row.index));
+        }
+        indices.extend(runs.later.iter().skip(self.later).map(|own| own.index));
+        indices.sort_unstable();
+        indices.dedup();
+        indices
     }
 }
 
@@ -200,30 +233,19 @@ impl RunSource<'_> {
         Ok(())
     }
 
-    /// The runs of each campaign that have not been taken, or were judged since.
-    fn missing(&self, taken: &HashMap<String, Taken>) -> Result<Vec<Missing>, Diagnostics> {
-        let mut missing = Vec::new();
+    /// All campaigns with all their runs.
+    fn all(&self) -> Result<Vec<Missing>, Diagnostics> {
+        let mut all = Vec::new();
         for state in self.stored.states()? {
-            let id = &state.record.id;
-            let runs = self.stored.runs_of(id)?;
-            let indices = match taken.get(id) {
-                None => runs.iter().map(|run| run.row.index).collect(),
-                Some(taken) => {
-                    let mut indices = Vec::new();
-                    for segment in &runs.segments {
-                        let known = taken.rows.get(&segment.number()).copied();
-                        let new = &segment.rows()[known.unwrap_or_default()..];
-                        indices.extend(new.iter().map(|row| row.index));
-                    }
-                    indices.extend(runs.later[taken.later..].iter().map(|own| own.index));
-                    indices.sort_unstable();
-                    indices.dedup();
-                    indices
-                }
-            };
-            missing.push(Missing { runs, indices });
+            let runs = self.stored.runs_of(&state.record.id)?;
+            let indices = runs.iter().map(|run| run.row.index).collect();
+            all.push(Missing {
+                state,
+                runs,
+                indices,
+            });
         }
-        Ok(missing)
+        Ok(all)
     }
 
     /// The number of demanded statements about runs, from those about a few of them.
@@ -273,18 +295,25 @@ impl RunSource<'_> {
             }
             Ok::<_, Diagnostics>(made)
         };
+        let mut count = dataset.len() as u64;
         let mut take = |made: Vec<RunStatements>| {
             for RunStatements { quads, graphs } in made {
+                count += quads.len() as u64;
                 dataset.extend(quads);
                 for graph in graphs {
                     dataset.add_graph(graph.as_ref().into());
                 }
             }
+            // The runs that were counted before may have far fewer than the others.
+            if count > 2 * MOST_STATEMENTS {
+                return Err(too_many(self.stored, count));
+            }
+            Ok(())
         };
         let threads = self.threads.min(chunks.len());
         if threads < 2 {
             for chunk in chunks {
-                take(make(chunk)?);
+                take(make(chunk)?)?;
             }
             return Ok(());
         }
@@ -309,7 +338,7 @@ impl RunSource<'_> {
             for number in 0..chunks.len() {
                 // A thread that ended without its chunk has panicked, which the scope reports.
                 if let Ok(made) = receivers[number % threads].recv() {
-                    take(made?);
+                    take(made?)?;
                 }
             }
             Ok(())
