@@ -63,7 +63,7 @@ pub fn merge(args: &MergeArgs) -> Result<u8, Diagnostics> {
     );
     let bar = progress.bar();
     let stop =
-        stop::on_interrupt(move || bar.println("stopping after this run; merge again to continue"));
+        stop::on_interrupt(move || bar.println("stopping after these runs; merge again to continue"));
     let merged = carry_out(&plan, &sources, &into, &stop, || progress.judged(1, 0));
     progress.finish();
     let merged = merged?;

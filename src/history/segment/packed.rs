@@ -66,6 +66,8 @@ fn expanded(decompressor: &mut Decompressor<'_>, bytes: &[u8], size: u64) -> Opt
 pub(super) struct ColumnWriter {
     file: File,
     end: u64,
+    /// Whether half a frame is after the end, which could not be removed: nothing may follow it.
+    is_torn: bool,
     key: Option<Key>,
 }
 
@@ -93,6 +95,7 @@ impl ColumnWriter {
         Ok(Self {
             file,
             end: HEAD as u64,
+            is_torn: false,
             key: None,
         })
     }
@@ -107,11 +110,13 @@ impl ColumnWriter {
     /// # Errors
     /// Writing failed.
     pub(super) fn append(&mut self, content: &[u8]) -> io::Result<FramePlace> {
+        if self.is_torn {
+            return Err(io::Error::other("an earlier write failed"));
+        }
         let mut bytes = Vec::with_capacity(FRAME_HEADER + content.len());
         let place = put(self.end, content, &mut bytes)?;
         if let Err(error) = self.file.write_all(&bytes) {
-            // If this fails, too, the file has a torn tail.
-            let _ = self.file.set_len(self.end);
+            self.is_torn = self.file.set_len(self.end).is_err();
             return Err(error);
         }
         self.end = place.end();
