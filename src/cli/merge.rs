@@ -62,8 +62,9 @@ pub fn merge(args: &MergeArgs) -> Result<u8, Diagnostics> {
         None,
     );
     let bar = progress.bar();
-    let stop =
-        stop::on_interrupt(move || bar.println("stopping after these runs; merge again to continue"));
+    let stop = stop::on_interrupt(move || {
+        bar.println("stopping after these runs; merge again to continue")
+    });
     let merged = carry_out(&plan, &sources, &into, &stop, || progress.judged(1, 0));
     progress.finish();
     let merged = merged?;
