@@ -19,6 +19,7 @@ use actcheck::history::{
 use tempfile::TempDir;
 
 use crate::facts::{BODIES, sample_trace};
+use crate::support::copy;
 use crate::support::foreign::left_out;
 
 fn model(name: &str) -> Arc<ObjectModel> {

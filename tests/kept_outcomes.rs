@@ -10,7 +10,7 @@ use tempfile::TempDir;
 use crate::fuzz_corpus::entrances::frames;
 use crate::history::{left_by_a_kill, run_ids, sample_campaign, sample_run};
 use crate::support::exported::{Exported, statements};
-use crate::support::{actcheck, copy, edit, project, stderr, stdout};
+use crate::support::{actcheck, edit, project, stderr, stdout};
 
 const RUNS: u64 = 140;
 
