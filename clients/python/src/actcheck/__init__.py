@@ -11,11 +11,19 @@ def pick(robot, pickObject):
 if __name__ == "__main__":
     actcheck.serve()
 ```
+
+Or record the episodes of your own simulation, to be judged by actcheck:
+
+```python
+with actcheck.record(env, "episodes/"):
+    ...  # env.reset() and env.step() as usual
+```
 """
 
 from actcheck.connect import Connection, Result, connect
 from actcheck.env import ActionEnv, Box
-from actcheck.faults import Aborted, Closed, Failed, ProtocolFault, Unreachable
+from actcheck.faults import Aborted, Closed, Failed, Fault, JudgeError, ProtocolFault, RecordingFault, Unreachable
+from actcheck.judge import Judge, Judgement, Monitor, Verdict
 from actcheck.messages import (
     PROTOCOL,
     Call,
@@ -30,6 +38,7 @@ from actcheck.messages import (
     Thing,
 )
 from actcheck.pose import Pose, wrapped
+from actcheck.recording import Recorder, record
 from actcheck.robot import Robot
 from actcheck.skill import serve, skill
 
@@ -46,19 +55,28 @@ __all__ = [
     "Connection",
     "DepthImage",
     "Failed",
+    "Fault",
     "Held",
     "Joint",
+    "Judge",
+    "JudgeError",
+    "Judgement",
+    "Monitor",
     "Observation",
     "Plane",
     "Pose",
     "ProtocolFault",
+    "Recorder",
+    "RecordingFault",
     "Report",
     "Result",
     "Robot",
     "RobotDescription",
     "Thing",
     "Unreachable",
+    "Verdict",
     "connect",
+    "record",
     "serve",
     "skill",
     "wrapped",

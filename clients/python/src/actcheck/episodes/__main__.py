@@ -1,0 +1,7 @@
+"""`python -m actcheck.episodes`."""
+
+import sys
+
+from actcheck.episodes.command import main
+
+sys.exit(main())
