@@ -30,8 +30,10 @@
 //! | [`actions`] | the robot's actions through commands and observations; the `Trace` | |
 //! | [`protocol`] | actions performed by an external program, in lockstep over a socket | nix |
 //! | [`facts`] | a `Trace` to RDF facts, interned once | |
+//! | [`episodes`] | recordings of other simulators to the same `Trace` | mcap, prost, parry3d (distances) |
 //! | [`rules`] | rule text to derived facts; SPARQL properties | datafrog, oxrdf, oxrdfio (imports), oxigraph (evaluator, feature `sparql`), spargebra (parser) |
 //! | [`verdict`] | findings to outcomes with witness and margin; the scores | |
+//! | `judge` | plain values of one action to outcomes; the module of Python programs | pyo3 (feature `python`) |
 //! | [`history`] | the run store: transactions, queries, traces | oxigraph (store), spargebra (parser) |
 //! | [`campaign`] | runs the stages of a campaign; the only crate that calls many stages | rayon |
 //! | [`analysis`] | history to tables and patterns: rates with intervals, failure modes, comparison of campaigns, failure conditions | polars, statrs |
@@ -66,6 +68,8 @@ pub use actcheck_actions as actions;
 pub use actcheck_protocol as protocol;
 
 pub use actcheck_facts as facts;
+
+pub use actcheck_episodes as episodes;
 
 pub use actcheck_rules as rules;
 

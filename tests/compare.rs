@@ -437,7 +437,7 @@ fn impossible_comparisons_are_refused_with_the_reason() {
         })
         .unwrap();
     let mut record = sample_run("k", 0);
-    record.scene.robot.base = [0.0; 3];
+    record.scene.base = [0.0; 3];
     other.commit(&record).unwrap();
     drop(other);
     drop(History::open(&folder.join("none")).unwrap());

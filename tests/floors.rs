@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 /// Each crate and the crates that it may depend on, in the order of the pipeline. `cli` may depend
 /// on all.
-const FLOORS: [(&str, &[&str]); 18] = [
+const FLOORS: [(&str, &[&str]); 20] = [
     ("base", &[]),
     ("data", &["base"]),
     ("search", &[]),
@@ -21,14 +21,19 @@ const FLOORS: [(&str, &[&str]); 18] = [
         &["base", "data", "config", "scenario", "world", "actions"],
     ),
     ("facts", &["base", "data"]),
+    ("episodes", &["base", "data", "config", "scenario"]),
     ("rules", &["base", "ontology"]),
-    ("verdict", &["base", "ontology"]),
+    ("verdict", &["base", "data", "ontology", "rules"]),
+    (
+        "judge",
+        &["base", "data", "ontology", "facts", "rules", "verdict"],
+    ),
     ("history", &["base", "data", "facts", "verdict"]),
     (
         "campaign",
         &[
             "base", "data", "search", "config", "ontology", "scenario", "world", "actions",
-            "protocol", "facts", "rules", "verdict", "history",
+            "protocol", "facts", "episodes", "rules", "verdict", "history",
         ],
     ),
     ("analysis", &["base", "data", "history", "verdict"]),
@@ -41,7 +46,7 @@ const FLOORS: [(&str, &[&str]); 18] = [
 ];
 
 /// Libraries of the field and the crates that may depend on them.
-const FENCES: [(&str, &[&str]); 30] = [
+const FENCES: [(&str, &[&str]); 33] = [
     ("toml", &["config"]),
     ("roxmltree", &["config"]),
     ("mesh-loader", &["config"]),
@@ -52,7 +57,10 @@ const FENCES: [(&str, &[&str]); 30] = [
     ("oxrdf", &["ontology", "rules"]),
     ("oxrdfio", &["ontology", "rules"]),
     ("rapier3d", &["world"]),
-    ("parry3d", &["world", "scenario"]),
+    ("parry3d", &["world", "scenario", "episodes"]),
+    ("mcap", &["episodes"]),
+    ("prost", &["episodes"]),
+    ("pyo3", &["judge"]),
     ("urdf-rs", &["world"]),
     ("datafrog", &["rules"]),
     ("polars", &["analysis"]),
@@ -63,6 +71,7 @@ const FENCES: [(&str, &[&str]); 30] = [
     ("hyper", &["serve"]),
     ("hyper-util", &["serve"]),
     ("tokio", &["serve"]),
+    ("pyo3", &["judge"]),
     ("spargebra", &["history", "rules"]),
     ("ureq", &["remote"]),
     ("rustls", &["remote"]),

@@ -484,6 +484,7 @@ fn earl_parses_and_is_consistent_under_owl_rl() {
     let runs: Vec<RunDetail> = fifteen().into_iter().chain(six()).collect();
     runs.iter().for_each(|run| report.add(run));
     let campaign = CampaignRow {
+        imported_from: None,
         id: "aaaa".to_owned(),
         name: "pick".to_owned(),
         started: "2026-01-01T00:00:00Z".to_owned(),

@@ -41,7 +41,8 @@ fn below(command: &str) -> Vec<String> {
 #[test]
 fn commands_and_options_are_few() {
     let commands = commands();
-    assert!(commands.len() <= 22, "{}: {commands:?}", commands.len());
+    // 22 for campaigns, and two for episodes of other simulators.
+    assert!(commands.len() <= 24, "{}: {commands:?}", commands.len());
     let options = |arguments: &[&str]| -> Vec<String> {
         let help = stdout(&actcheck(root(), &[arguments, &["--help"]].concat()));
         let option = |line: &str| {
@@ -67,7 +68,7 @@ fn commands_and_options_are_few() {
         }
     }
     assert!(all.len() > 100, "they are found: {all:#?}");
-    assert!(all.len() <= 130, "{}: {all:#?}", all.len());
+    assert!(all.len() <= 145, "{}: {all:#?}", all.len());
 }
 
 #[test]

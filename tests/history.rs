@@ -12,6 +12,7 @@ use actcheck::data::{
     RobotProfile, RobotStart, Role, Scene, SceneObject, Sensing,
 };
 use actcheck::facts::extract;
+use actcheck::history::RunScene;
 use actcheck::history::{
     CampaignEnd, CampaignRecord, Cancel, History, QueryAnswer, RunFilter, RunRecord, RunStatus,
     SkillRecord,
@@ -177,7 +178,8 @@ pub fn sample_run(campaign: &str, index: u64) -> RunRecord {
             kind: ChoiceKind::Normal { sigma: 0.1 },
             value: 0.07,
         }],
-        scene: scene(),
+        scene: RunScene::of(&scene()),
+        episode: None,
         facts: extract(&trace),
         trace,
         actions: vec![names::act("Pick")],
@@ -218,6 +220,7 @@ pub fn run_ids(history: &History) -> Vec<String> {
 /// A campaign that began in a given minute.
 pub fn sample_campaign(id: &str, minute: u32) -> CampaignRecord {
     CampaignRecord {
+        imported_from: None,
         id: id.to_owned(),
         name: "pick".to_owned(),
         config_text: "seed = 7\n".to_owned(),

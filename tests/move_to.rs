@@ -76,7 +76,7 @@ fn without_noise_and_obstacles_every_place_is_reached() {
             let [truly, believed] = ends(&run);
             let name = &run.scene.designators["objectLocation"][0];
             let goal = run
-                .scene
+                .trace
                 .map
                 .locations
                 .iter()

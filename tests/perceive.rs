@@ -61,11 +61,13 @@ fn without_noise_a_table_and_its_objects_are_seen_exactly() {
         let seen = seen.unwrap_or_else(|| panic!("{} was not seen: {:?}", object.id, things(&run)));
         assert_eq!(
             seen.category.as_ref(),
-            Some(&object.model.category),
+            Some(&object.category),
             "{} seen as {seen:?}",
             object.id
         );
-        for (seen, known) in seen.size_m.iter().zip(object.model.size_m) {
+        let bodies = &run.trace.snapshots[0].bodies;
+        let body = bodies.iter().find(|body| body.id == object.id).unwrap();
+        for (seen, known) in seen.size_m.iter().zip(body.size_m) {
             assert!(
                 (seen - known).abs() < 0.01,
                 "{}: {seen} for {known}",

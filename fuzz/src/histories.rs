@@ -36,6 +36,7 @@ pub const WAYS: usize = 3;
 pub fn made(folder: &Path, runs: &[RunRecord]) {
     let history = History::open(folder).expect("the folder can be written");
     let record = CampaignRecord {
+        imported_from: None,
         id: "k".to_owned(),
         name: "pick".to_owned(),
         config_text: "seed = 7\n".to_owned(),

@@ -180,6 +180,7 @@ fn facts() -> &'static RunFacts {
             during,
             parameters,
             courses: vec![None],
+            lacks: Vec::new(),
         }
     })
 }

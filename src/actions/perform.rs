@@ -131,6 +131,7 @@ pub fn perform_with(
         map: SceneMap::default(),
         forms,
         robot_courses,
+        lacks: Vec::new(),
     }
 }
 

@@ -18,6 +18,9 @@ pub struct RunFacts {
     pub parameters: Vec<Vec<[TermId; 2]>>,
     /// One course for each action; `None` if it was not recorded or not read.
     pub courses: Vec<Option<Course>>,
+    /// IRIs of the properties whose facts were not recorded, and of the things about which nothing
+    /// was recorded, sorted.
+    pub lacks: Vec<String>,
 }
 
 /// The facts of one action, as the input of rules.
@@ -35,9 +38,17 @@ pub struct ActionFacts<'a> {
     pub parameters: &'a [[TermId; 2]],
     /// Quantities over time; `None` if they were not recorded or not read.
     pub course: Option<&'a Course>,
+    /// IRIs of the properties whose facts were not recorded, and of the things about which nothing
+    /// was recorded, sorted.
+    pub lacks: &'a [String],
 }
 
 impl RunFacts {
+    /// Returns the facts of the first state; empty without states.
+    pub fn start(&self) -> &[Triple] {
+        self.snapshots.first().map_or(&[], Vec::as_slice)
+    }
+
     /// Returns the facts of one action, counted from 0, or `None` if it was never reached.
     pub fn action(&self, step: usize) -> Option<ActionFacts<'_>> {
         Some(ActionFacts {
@@ -47,6 +58,7 @@ impl RunFacts {
             during: self.during.get(step)?,
             parameters: self.parameters.get(step)?,
             course: self.courses.get(step).and_then(Option::as_ref),
+            lacks: &self.lacks,
         })
     }
 }

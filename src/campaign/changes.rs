@@ -168,6 +168,7 @@ mod tests {
 
     fn record(digest: &str) -> CampaignRecord {
         CampaignRecord {
+            imported_from: None,
             id: "k7f3".to_owned(),
             name: "pick".to_owned(),
             config_text: String::new(),

@@ -80,6 +80,7 @@ impl Env {
         config: Option<&Path>,
     ) -> Result<(Self, CampaignRecord), Diagnostics> {
         let record = history.campaign(campaign)?;
+        can_be_simulated(&record)?;
         let overrides = recorded_overrides(history, &record);
         let loaded = match config {
             Some(config) => config::load(config, &overrides),
@@ -107,6 +108,7 @@ impl Env {
     /// `H014` if the history has no such campaign.
     pub fn starts_from_history(history: &History, campaign: &str) -> Result<Starts, Diagnostics> {
         let record = history.campaign(campaign)?;
+        can_be_simulated(&record)?;
         let (source, folder) = stored_configuration(history, &record);
         Ok(config::starts(&source, &folder))
     }
@@ -270,6 +272,7 @@ impl Env {
             self.findings().iter().map(FindingRecord::of).collect();
         findings.sort();
         CampaignRecord {
+            imported_from: None,
             id,
             name,
             config_text: self.text.clone(),
@@ -501,5 +504,20 @@ fn check_skills(campaign: &Campaign, ontology: &Ontology, faults: &mut Diagnosti
                 });
             }
         }
+    }
+}
+
+/// E020: checks that a campaign was simulated here.
+fn can_be_simulated(record: &CampaignRecord) -> Result<(), Diagnostic> {
+    match &record.imported_from {
+        None => Ok(()),
+        Some(engine) => Err(Diagnostic::error(
+            "E020",
+            format!(
+                "campaign {} was imported from {engine}: its runs can't be simulated here",
+                record.id
+            ),
+        )
+        .help("run it again in its own simulator; `actcheck report` replays its recorded motion")),
     }
 }

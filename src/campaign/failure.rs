@@ -1,5 +1,7 @@
 //! The reasons why a scene gives no run.
 
+use actcheck_verdict::Interrupted;
+
 /// The reason why a scene gave no run.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Failure {
@@ -12,4 +14,10 @@ pub enum Failure {
     /// The run was interrupted while rules were evaluated.
     #[error("interrupted")]
     Interrupted,
+}
+
+impl From<Interrupted> for Failure {
+    fn from(_: Interrupted) -> Self {
+        Self::Interrupted
+    }
 }

@@ -2,7 +2,7 @@
 
 use actcheck_base::{Judgement, RunFacts};
 use actcheck_data::{Choice, Quality, Scene, Trace};
-use actcheck_history::{Repetition, RunRecord, RunStatus};
+use actcheck_history::{Repetition, RunRecord, RunScene, RunStatus};
 
 /// The results of a run.
 #[derive(Debug)]
@@ -85,7 +85,8 @@ impl FinishedRun {
             action_scores: self.action_scores,
             discards: place.discards,
             choices: self.choices,
-            scene: self.scene,
+            scene: RunScene::of(&self.scene),
+            episode: None,
             trace: self.trace,
             facts: self.facts,
             actions: self.actions,

@@ -15,7 +15,7 @@ mod failure;
 mod finished_run;
 mod forecast;
 mod forecast_cup;
-mod judging;
+mod import;
 mod last_failed;
 mod line;
 mod make_run;
@@ -46,6 +46,10 @@ pub use difference::TraceDifference;
 pub use environment::Env;
 pub use export::{export, regressions_folder};
 pub use failure::Failure;
+pub use import::{
+    AuditedEpisode, CheckedPremises, EpisodeFile, ImportEnd, ImportOptions, audit_episode,
+    check_premises, import, name_of_import,
+};
 pub use last_failed::LastFailed;
 pub use line::{Clock, Disturbance, RunContext, RunInput, run_line, run_sabotaged};
 pub use outcome::{CampaignResult, Ending, WeightedRate};

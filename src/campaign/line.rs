@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use crate::finished_run::{FinishedRun, RunPlace};
-use crate::judging::judge_action;
 use crate::preconditions::Preconditions;
 use crate::{Env, Failure};
 use actcheck_actions as actions;
@@ -15,7 +14,7 @@ use actcheck_facts as facts;
 use actcheck_history::{RunRecord, RunStatus};
 use actcheck_protocol::{Performance, RunName};
 use actcheck_scenario as scenario;
-use actcheck_verdict::{action_score, run_score};
+use actcheck_verdict::{action_score, judge_action, run_score};
 use actcheck_world as world;
 use actcheck_world::World;
 
@@ -406,15 +405,14 @@ pub(super) fn judge_all(
         .enumerate()
         .map(|(step, performed)| {
             let action = &env.ontology.actions[&performed.action];
-            let facts = facts.action(step);
-            judge_action(
+            Ok(judge_action(
                 &env.ontology,
                 &env.rules,
                 action,
                 &performed.end,
-                facts,
+                (facts.start(), facts.action(step)),
                 &env.rule_budget,
-            )
+            )?)
         })
         .collect()
 }

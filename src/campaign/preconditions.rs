@@ -73,5 +73,6 @@ pub(super) fn facts_before(facts: &RunFacts) -> ActionFacts<'_> {
         during: &[],
         parameters,
         course: None,
+        lacks: &facts.lacks,
     }
 }

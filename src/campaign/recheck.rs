@@ -4,7 +4,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use rayon::prelude::*;
 
-use crate::judging::judge_action;
 use crate::workers::workers;
 use crate::{Ending, RuleSet};
 use actcheck_base::{Diagnostic, Diagnostics, RunFacts};
@@ -12,6 +11,7 @@ use actcheck_data::{ActionEnd, ActionTrace};
 use actcheck_facts as facts;
 use actcheck_history::{History, NewestJudgements, Recheck, RunRow, StoredJudgement};
 use actcheck_rules::Budget;
+use actcheck_verdict::judge_action;
 
 /// Options of [`recheck`]. The number of workers does not change the result.
 #[derive(Debug, Clone)]
@@ -208,13 +208,13 @@ fn judge_step(
     // The length of a test is not limited.
     let number = u32::try_from(step + 1).unwrap_or(u32::MAX);
     let mut stored = newest.read(&run.run, number, &action.success_properties)?;
-    let (facts, budget) = (facts.action(step), Budget::default());
+    let budget = Budget::default();
     let judged = judge_action(
         &rules.ontology,
         &rules.rules,
         action,
         &performed.end,
-        facts,
+        (facts.start(), facts.action(step)),
         &budget,
     )
     .map_err(|failure| Diagnostic::error("R091", failure.to_string()))?;

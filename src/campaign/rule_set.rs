@@ -88,6 +88,7 @@ impl RuleSet {
                     .success_properties
                     .iter()
                     .chain(&action.preconditions)
+                    .chain(&action.premises)
             })
             .collect();
         ontology.properties.retain(|iri, _| asked.contains(iri));

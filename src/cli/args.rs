@@ -257,6 +257,27 @@ pub enum Command {
         after_help = "Example:\n  actcheck run configs/pick.toml --shard 1/2 --history /tmp/h1\n  actcheck run configs/pick.toml --shard 2/2 --history /tmp/h2\n  actcheck merge /tmp/h1 /tmp/h2 --into /tmp/all"
     )]
     Merge(crate::merge::MergeArgs),
+    /// Import episodes of another simulator or a robot, and judge them by the same rules
+    ///
+    /// A mapping says which body is the object, the gripper, the fingers and the surface, and which
+    /// action was performed when. Properties that read something which was not recorded are
+    /// inapplicable, with the name of the missing fact. Imported runs can be listed, explained,
+    /// rechecked, queried and reported like simulated ones, but not replayed.
+    ///
+    /// Exit code: 0 everything passed, 1 a property failed, 2 an episode could not be imported (the
+    /// others are), 130 interrupted by Ctrl-C (imported episodes are kept).
+    #[command(
+        after_help = "Examples:\n  actcheck import episodes/\n  actcheck import demo.hdf5 --python venv/bin/python\n  actcheck import --propose episode.mcap > mapping.toml"
+    )]
+    Import(crate::import::ImportArgs),
+    /// Check whether the first states of episodes are those that their tasks are about
+    ///
+    /// Judges the premises that the ontology states of the episodes' actions, over the first state at
+    /// rest, and prints one line for each task. Nothing is stored.
+    ///
+    /// Exit code: 0 all premises hold, 1 one does not, 2 an episode could not be read.
+    #[command(after_help = "Example:\n  actcheck check-episodes episodes/ --mapping mapping.toml")]
+    CheckEpisodes(crate::check_episodes::CheckEpisodesArgs),
     /// Export a stored run as a case, or the history as tables or RDF, or send it to a SPARQL store
     #[command(
         after_help = "Examples:\n  actcheck export run k7f3-3 -o case.toml    (a run id from `actcheck list`; a prefix is enough)\n  actcheck export tables columns    (after `actcheck run configs/pick.toml`)\n  actcheck export rdf history.nq\n  actcheck export store http://localhost:3030/history/update    (another store, such as Fuseki)"

@@ -1,12 +1,13 @@
 //! `actcheck check-oracles`
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget};
 
+use crate::audit::{Audit, audit};
 use crate::options::Format;
 use crate::work::{all_cores, quietly};
 use crate::{clock, output, stop};
@@ -22,7 +23,19 @@ use actcheck_rules::Budget;
 #[derive(Debug, Args)]
 pub struct CheckOraclesArgs {
     /// The campaign's configuration (TOML)
-    pub config: PathBuf,
+    #[arg(required_unless_present = "episodes")]
+    pub config: Option<PathBuf>,
+    /// Instead, audit the success check of another simulator: a suite whose faulty episodes are made
+    /// now (`libero_spatial`, `robosuite/Stack`), or files of faulty episodes; may be given several
+    /// times
+    #[arg(long, value_name = "SUITE|FILE", conflicts_with_all = ["config", "runs", "seed", "jobs"])]
+    pub episodes: Vec<String>,
+    /// The mapping for these episodes [default: the shipped one for the environment]
+    #[arg(long, value_name = "FILE", requires = "episodes")]
+    pub mapping: Option<PathBuf>,
+    /// The Python of that simulator
+    #[arg(long, value_name = "PROGRAM", default_value = "python3")]
+    pub python: PathBuf,
     /// Scenes for each test, instead of the configuration's `test_count`; each runs once without a
     /// fault and once with each fault
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -40,6 +53,14 @@ pub struct CheckOraclesArgs {
 
 /// Runs every scene with every fault and prints which properties detect it. Returns the exit code.
 pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
+    let Some(config) = &args.config else {
+        return audit(&Audit {
+            episodes: &args.episodes,
+            mapping: args.mapping.as_deref(),
+            python: &args.python,
+            format: args.format,
+        });
+    };
     let overrides = Overrides {
         runs: args.runs,
         seed: args.seed,
@@ -51,7 +72,7 @@ pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
         stop: Arc::clone(&stop),
         ..Budget::default()
     };
-    let env = Env::prepare_within(&args.config, &overrides, budget)?;
+    let env = Env::prepare_within(config, &overrides, budget)?;
     env.check_starts()?;
     let concerns = |fault: &Fault| {
         env.campaign
@@ -83,7 +104,7 @@ pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
         .help("`actcheck run` with the same configuration shows why")
         .into());
     }
-    let summary = summarise(args, &env, &faults, &trials);
+    let summary = summarise(config, &env, &faults, &trials);
     output::print(&match args.format {
         Format::Text => oracles_text(&summary, output::page()),
         Format::Csv => oracles_table(&summary).render(Format::Csv.into(), output::page()),
@@ -93,12 +114,7 @@ pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
     Ok(summary.exit_code())
 }
 
-fn summarise(
-    args: &CheckOraclesArgs,
-    env: &Env,
-    faults: &[Fault],
-    trials: &[Trial],
-) -> OracleSummary {
+fn summarise(config: &Path, env: &Env, faults: &[Fault], trials: &[Trial]) -> OracleSummary {
     let mut properties: Vec<String> = Vec::new();
     for action in env
         .campaign
@@ -132,7 +148,7 @@ fn summarise(
             .map_or_else(|| iri.clone(), |p| p.name.clone())
     };
     OracleSummary {
-        config: args.config.display().to_string(),
+        config: config.display().to_string(),
         seed: env.campaign.seed,
         planned: env.planned_runs(),
         faults: tried

@@ -1,7 +1,7 @@
 //! The runs of a history that a command uses.
 
 use std::cmp::Reverse;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use clap::Args;
@@ -47,6 +47,44 @@ pub(super) fn sampling(
     Ok(of.fold(Sampling::Fixed, Sampling::and))
 }
 
+/// E019: checks that no campaign of a history has another physics engine than the others.
+///
+/// # Errors
+/// E019: rates over runs of several engines are made only for named campaigns.
+pub(super) fn one_engine(history: &History) -> Result<(), Diagnostics> {
+    let mut of_engine: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for campaign in history.campaigns()? {
+        let engine = engine_name(campaign.imported_from.as_deref()).to_owned();
+        of_engine.entry(engine).or_default().push(campaign.id);
+    }
+    if of_engine.len() < 2 {
+        return Ok(());
+    }
+    let listed: Vec<String> = of_engine
+        .iter()
+        .map(|(engine, campaigns)| format!("{} of {engine}", campaigns.join(", ")))
+        .collect();
+    let newest = of_engine.values().next().and_then(|ids| ids.last());
+    let example = newest.map_or("ID", String::as_str);
+    Err(Diagnostic::error(
+        "E019",
+        format!(
+            "the history `{}` has runs of several engines: {}",
+            history.dir().display(),
+            listed.join("; ")
+        ),
+    )
+    .help(format!(
+        "name the campaigns that count: `--campaign {example}` (several may be named)"
+    ))
+    .into())
+}
+
+/// The engine of a campaign in words.
+pub(super) fn engine_name(imported_from: Option<&str>) -> &str {
+    imported_from.unwrap_or("this simulator")
+}
+
 impl ChosenRuns {
     /// Opens the history of the runs for reading.
     pub(super) fn open(&self) -> Result<History, Diagnostics> {
@@ -60,6 +98,9 @@ impl ChosenRuns {
     pub(super) fn filter(&self, history: &History) -> Result<TableFilter, Diagnostics> {
         for campaign in &self.campaign {
             history.campaign(campaign)?;
+        }
+        if self.campaign.is_empty() {
+            one_engine(history)?;
         }
         let campaigns = (!self.campaign.is_empty()).then(|| self.campaign.clone());
         Ok(TableFilter {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::chosen::sampling;
+use crate::chosen::{engine_name, sampling};
 use crate::options::{Format, HistoryArgs, level};
 use crate::{history_dir, output};
 use actcheck_analysis::{ComparedRun, ComparedRuns, Comparison, Sampling, compare as compare_runs};
@@ -42,6 +42,9 @@ pub struct CompareArgs {
     /// decide); at the level of --fail-if-worse, or 0.05
     #[arg(long)]
     pub decide: bool,
+    /// Compare also if the campaigns have different physics engines
+    #[arg(long)]
+    pub across_engines: bool,
     /// The folder of the history for an ID without DIR.
     #[command(flatten)]
     pub history: HistoryArgs,
@@ -55,6 +58,16 @@ pub fn compare(args: &CompareArgs) -> Result<u8, Diagnostics> {
     let mut histories = Histories::default();
     let first = Side::read(&args.first, &args.history, &mut histories)?;
     let second = Side::read(&args.second, &args.history, &mut histories)?;
+    let engines = [&first, &second].map(|side| engine_name(side.record.imported_from.as_deref()));
+    if engines[0] != engines[1] && !args.across_engines {
+        let message = format!(
+            "{} has runs of {}, and {} of {}",
+            args.first, engines[0], args.second, engines[1]
+        );
+        return Err(Diagnostic::error("E019", message)
+            .help("a difference may be the engine's; `--across-engines` compares them all the same")
+            .into());
+    }
     let comparison = compare_runs(
         &first.runs,
         &second.runs,

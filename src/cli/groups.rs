@@ -38,6 +38,8 @@ const GROUPS: [Group; 2] = [
             "explain",
             "launch",
             "merge",
+            "import",
+            "check-episodes",
             "export",
             "check-oracles",
             "datalog",

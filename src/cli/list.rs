@@ -8,6 +8,7 @@ use clap::Args;
 use serde_json::Value;
 
 use crate::chosen::{self, is_meant};
+use crate::option_fault::OptionFault;
 use crate::options::{Format, HistoryArgs};
 use crate::where_rows::{Condition, matching_runs};
 use crate::{history_dir, output, rules};
@@ -181,8 +182,9 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
     Ok(())
 }
 
-fn outcome(word: &str) -> Result<Outcome, String> {
-    Outcome::from_word(word).ok_or_else(|| did_you_mean(word, Outcome::ALL.map(Outcome::word)))
+fn outcome(word: &str) -> Result<Outcome, OptionFault> {
+    Outcome::from_word(word)
+        .ok_or_else(|| did_you_mean(word, Outcome::ALL.map(Outcome::word)).into())
 }
 
 /// The outcomes of the named properties by run: one text for each property.

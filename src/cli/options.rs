@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
+use crate::option_fault::OptionFault;
 use actcheck_config::duration_secs;
 use actcheck_report::TableFormat;
 
@@ -71,13 +72,13 @@ pub enum ProofFormat {
 ///
 /// # Errors
 /// A message if the text is neither, or not above zero.
-pub fn duration(text: &str) -> Result<f64, String> {
+pub fn duration(text: &str) -> Result<f64, OptionFault> {
     match text.trim().parse::<f64>() {
         Ok(secs) if secs > 0.0 && secs.is_finite() => Ok(secs),
-        Ok(_) => Err(format!(
-            "`{text}` must be a duration above zero, such as 90s, 10m or 2h"
-        )),
-        Err(_) => duration_secs(text).map_err(|fault| fault.to_string()),
+        Ok(_) => {
+            Err(format!("`{text}` must be a duration above zero, such as 90s, 10m or 2h").into())
+        }
+        Err(_) => duration_secs(text).map_err(|fault| fault.to_string().into()),
     }
 }
 
@@ -86,7 +87,7 @@ pub fn duration(text: &str) -> Result<f64, String> {
 ///
 /// # Errors
 /// A message if the text is none of these, or not above zero.
-pub fn memory(text: &str) -> Result<usize, String> {
+pub fn memory(text: &str) -> Result<usize, OptionFault> {
     const UNITS: [(&str, f64); 7] = [
         ("KiB", 1024.0),
         ("MiB", 1_048_576.0),
@@ -105,7 +106,8 @@ pub fn memory(text: &str) -> Result<usize, String> {
         Ok(amount) if amount * unit >= 1.0 && amount.is_finite() => Ok((amount * unit) as usize),
         _ => Err(format!(
             "`{text}` must be an amount of memory above zero, such as 512MiB or 4GiB"
-        )),
+        )
+        .into()),
     }
 }
 
@@ -113,10 +115,10 @@ pub fn memory(text: &str) -> Result<usize, String> {
 ///
 /// # Errors
 /// A message if the text is not a number above 0 and below 1.
-pub fn level(text: &str) -> Result<f64, String> {
+pub fn level(text: &str) -> Result<f64, OptionFault> {
     match text.parse() {
         Ok(level) if level > 0.0 && level < 1.0 => Ok(level),
-        _ => Err("must be a probability above 0 and below 1, such as 0.05".to_owned()),
+        _ => Err("must be a probability above 0 and below 1, such as 0.05".into()),
     }
 }
 

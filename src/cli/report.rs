@@ -6,6 +6,7 @@ use clap::Args;
 
 use crate::analyse::{Analysed, Question, analysed};
 use crate::chosen::{ChosenRuns, is_meant};
+use crate::option_fault::OptionFault;
 use crate::report_formats::{self, FormatArgs};
 use crate::trust::TrustArgs;
 use crate::{output, output_file, report_html, restore};
@@ -50,10 +51,10 @@ pub struct ReportArgs {
     pub trust: TrustArgs,
 }
 
-fn megabytes(text: &str) -> Result<f64, String> {
+fn megabytes(text: &str) -> Result<f64, OptionFault> {
     match text.parse() {
         Ok(megabytes) if (0.0..=1000.0).contains(&megabytes) => Ok(megabytes),
-        _ => Err("must be a number of megabytes from 0 to 1000, such as 5".to_owned()),
+        _ => Err("must be a number of megabytes from 0 to 1000, such as 5".into()),
     }
 }
 

@@ -28,13 +28,22 @@ pub fn rules(args: &ListArgs) -> Result<(), Diagnostics> {
     let mut judged: BTreeMap<String, Counts> = BTreeMap::new();
     let mut sampling = Sampling::Fixed;
     if let Some(history) = history_dir::open_if_any(&args.history)? {
+        match &args.campaign {
+            Some(campaign) => drop(history.campaign(campaign)?),
+            None => chosen::one_engine(&history)?,
+        }
+        let is_meant = |id: &str| args.campaign.as_ref().is_none_or(|campaign| campaign == id);
         let counted = history.counted_runs()?;
-        sampling = chosen::sampling(&history, |_| true)?;
+        sampling = chosen::sampling(&history, is_meant)?;
         let wish = Wish {
             judgements: Judgements::Newest,
             ..Wish::default()
         };
-        history.each_judged(&RunFilter::default(), wish, &mut |run| {
+        let filter = RunFilter {
+            campaign: args.campaign.clone(),
+            ..RunFilter::default()
+        };
+        history.each_judged(&filter, wish, &mut |run| {
             for own in run
                 .outcomes
                 .iter()
@@ -89,7 +98,7 @@ fn for_people(
     sampling: Sampling,
 ) -> Vec<Value> {
     let preconditions = named(ontology, |action| {
-        action.preconditions.contains(&property.iri)
+        action.preconditions.contains(&property.iri) || action.premises.contains(&property.iri)
     });
     let mut actions = named(ontology, |action| {
         action.success_properties.contains(&property.iri)
@@ -124,7 +133,7 @@ fn for_programs(
         action.success_properties.contains(&property.iri)
     });
     let preconditions = named(ontology, |action| {
-        action.preconditions.contains(&property.iri)
+        action.preconditions.contains(&property.iri) || action.premises.contains(&property.iri)
     });
     let share = Proportion::sampled(counts.passed, counts.decided(), sampling);
     let part = |part: fn(&Proportion) -> Option<f64>| Value::from(share.as_ref().and_then(part));

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use crate::option_fault::OptionFault;
 use crate::options::Format;
 use actcheck_base::{Shard, did_you_mean};
 use actcheck_config::duration_secs;
@@ -107,14 +108,14 @@ impl RunArgs {
 }
 
 /// Parses the name of a search strategy.
-fn strategy(name: &str) -> Result<Strategy, String> {
+fn strategy(name: &str) -> Result<Strategy, OptionFault> {
     let names = Strategy::ALL.map(Strategy::name);
-    Strategy::by_name(name).ok_or_else(|| did_you_mean(name, names))
+    Strategy::by_name(name).ok_or_else(|| did_you_mean(name, names).into())
 }
 
-fn width(text: &str) -> Result<f64, String> {
+fn width(text: &str) -> Result<f64, OptionFault> {
     match text.parse() {
         Ok(width) if width > 0.0 && width < 1.0 => Ok(width),
-        _ => Err(format!("`{text}` must be a number between 0 and 1")),
+        _ => Err(format!("`{text}` must be a number between 0 and 1").into()),
     }
 }

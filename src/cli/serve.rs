@@ -6,6 +6,7 @@ use std::sync::mpsc::channel;
 
 use clap::Args;
 
+use crate::option_fault::OptionFault;
 use crate::options::{HistoryArgs, duration, memory};
 use crate::{history_dir, named_queries, output, stop};
 use actcheck_base::{Diagnostic, Diagnostics, did_you_mean};
@@ -43,12 +44,12 @@ pub struct ServeQueryArgs {
 }
 
 /// Parses a port of this machine, or an address with a port.
-fn listened(text: &str) -> Result<SocketAddr, String> {
+fn listened(text: &str) -> Result<SocketAddr, OptionFault> {
     let own = text
         .parse()
         .map(|port| SocketAddr::from((Ipv4Addr::LOCALHOST, port)));
     own.or_else(|_| text.parse()).map_err(|_| {
-        "must be a port from 0 to 65535, or an address with a port such as 0.0.0.0:7878".to_owned()
+        "must be a port from 0 to 65535, or an address with a port such as 0.0.0.0:7878".into()
     })
 }
 
@@ -71,18 +72,20 @@ impl Limit {
     const KEYS: [&str; 5] = ["time", "rows", "size", "memory", "processes"];
 
     /// Parses a limit such as `time=30s`.
-    fn parse(text: &str) -> Result<Self, String> {
+    fn parse(text: &str) -> Result<Self, OptionFault> {
         let (key, value) = text.split_once('=').unwrap_or((text, ""));
         let number = || {
             let number = value.parse::<u64>().ok().filter(|number| *number > 0);
-            number.ok_or_else(|| format!("`{value}` must be a whole number above zero"))
+            number.ok_or_else(|| {
+                OptionFault::from(format!("`{value}` must be a whole number above zero"))
+            })
         };
         let bytes = |least: u64, most: u64, range: &str| {
             let bytes = memory(value)? as u64;
             if (least..=most).contains(&bytes) {
                 Ok(bytes)
             } else {
-                Err(format!("`{value}` must be {range}"))
+                Err(format!("`{value}` must be {range}").into())
             }
         };
         match key {
@@ -95,18 +98,18 @@ impl Limit {
             "processes" => number()?
                 .try_into()
                 .map(Self::Processes)
-                .map_err(|_| format!("`{value}` is too large")),
-            _ => Err(did_you_mean(key, Self::KEYS)),
+                .map_err(|_| format!("`{value}` is too large").into()),
+            _ => Err(did_you_mean(key, Self::KEYS).into()),
         }
     }
 }
 
-fn at_most_a_day(text: &str) -> Result<f64, String> {
+fn at_most_a_day(text: &str) -> Result<f64, OptionFault> {
     duration(text).and_then(|secs| {
         if secs <= 86_400.0 {
             Ok(secs)
         } else {
-            Err(format!("`{text}` must be at most a day (24h)"))
+            Err(format!("`{text}` must be at most a day (24h)").into())
         }
     })
 }

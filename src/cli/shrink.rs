@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
 
+use crate::option_fault::OptionFault;
 use crate::options::{Format, HistoryArgs, duration};
 use crate::picture::Picture;
 use crate::work::{all_cores, quietly};
@@ -291,12 +292,12 @@ fn why(env: &Env, record: &RunRecord, shrunk: &Shrunk) -> Result<Vec<String>, Di
     Ok(texts)
 }
 
-fn must_fail(text: &str) -> Result<Repeat, String> {
+fn must_fail(text: &str) -> Result<Repeat, OptionFault> {
     let parts = text
         .split_once('/')
         .and_then(|(least, of)| Some((least.parse().ok()?, of.parse().ok()?)));
     match parts {
         Some((least, of)) if 1 <= least && least <= of && of <= 1000 => Ok(Repeat { least, of }),
-        _ => Err("must be K/N, such as 3/5: at least 3 failures in 5 repetitions".to_owned()),
+        _ => Err("must be K/N, such as 3/5: at least 3 failures in 5 repetitions".into()),
     }
 }

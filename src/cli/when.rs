@@ -1,6 +1,7 @@
 //! Points in time on the command line.
 
 use crate::clock;
+use crate::option_fault::OptionFault;
 use actcheck_config::duration_secs;
 
 /// Parses a day, a point in time or a duration before now. Returns the time as histories store it
@@ -8,7 +9,7 @@ use actcheck_config::duration_secs;
 ///
 /// # Errors
 /// The text is none of these.
-pub fn parse(text: &str) -> Result<String, String> {
+pub fn parse(text: &str) -> Result<String, OptionFault> {
     let written = |moment: jiff::Timestamp| format!("{moment:.3}");
     if let Ok(moment) = text.parse::<jiff::Timestamp>() {
         return Ok(written(moment));
@@ -26,7 +27,7 @@ pub fn parse(text: &str) -> Result<String, String> {
         .and_then(|secs| jiff::SignedDuration::try_from_secs_f64(secs).ok());
     let then = ago.and_then(|ago| clock::timestamp().checked_sub(ago).ok());
     then.map(written).ok_or_else(|| {
-        "must be a day (2026-11-21), a time (2026-11-21T18:00:00Z) or a duration before now (90s, 10m, 12h)".to_owned()
+        "must be a day (2026-11-21), a time (2026-11-21T18:00:00Z) or a duration before now (90s, 10m, 12h)".into()
     })
 }
 

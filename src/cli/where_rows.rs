@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::chosen::is_meant;
+use crate::option_fault::OptionFault;
 use actcheck_analysis::{Column, ColumnKind, Mirror, OutcomeTable, TableFilter, columns};
 use actcheck_base::{Diagnostics, Outcome, did_you_mean, names};
 use actcheck_history::History;
@@ -31,7 +32,7 @@ impl Condition {
     ///
     /// # Errors
     /// It has no operator, no such column exists, or the value does not fit the column.
-    pub fn parse(text: &str) -> Result<Self, String> {
+    pub fn parse(text: &str) -> Result<Self, OptionFault> {
         let found = text.char_indices().find_map(|(at, _)| {
             let operator = OPERATORS
                 .into_iter()
@@ -90,29 +91,26 @@ impl Condition {
     }
 }
 
-fn value_of(column: &Column, operator: &str, text: &str) -> Result<Value, String> {
+fn value_of(column: &Column, operator: &str, text: &str) -> Result<Value, OptionFault> {
     let text = text.trim_matches(['"', '\'']);
     if text.is_empty() {
         return Err(format!(
             "`{} {operator}` needs a value, such as `{} {operator} 0.3`",
             column.name, column.name
-        ));
+        )
+        .into());
     }
     match (column.kind, text.parse::<f64>()) {
         (ColumnKind::Text, _) if matches!(operator, "=" | "!=") => Ok(Value::Text(text.to_owned())),
-        (ColumnKind::Text, _) => Err(format!(
-            "`{}` is a text: compare it with = or !=",
-            column.name
-        )),
+        (ColumnKind::Text, _) => {
+            Err(format!("`{}` is a text: compare it with = or !=", column.name).into())
+        }
         (ColumnKind::Bool, _) if matches!(text, "true" | "false") => {
             Ok(Value::Number(f64::from(text == "true")))
         }
-        (ColumnKind::Bool, _) => Err(format!("`{}` is true or false", column.name)),
+        (ColumnKind::Bool, _) => Err(format!("`{}` is true or false", column.name).into()),
         (_, Ok(number)) => Ok(Value::Number(number)),
-        (_, Err(_)) => Err(format!(
-            "`{}` is a number, but `{text}` is not",
-            column.name
-        )),
+        (_, Err(_)) => Err(format!("`{}` is a number, but `{text}` is not", column.name).into()),
     }
 }
 

@@ -32,7 +32,7 @@ pub use choices::{Choice, ChoiceKind, ChoiceValue, Choices};
 pub use facets::Face;
 pub use hull::convex_hull;
 pub use intervals::{Interval, IntervalKind};
-pub use mesh::{Mesh, Top};
+pub use mesh::{Mesh, MeshFault, Top};
 pub use model::{Inertia, MovingPart, ObjectModel, Rim, Surface};
 pub use motion::{JointMoment, Motion, MotionRow};
 pub use part_joint::PartJoint;

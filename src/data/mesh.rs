@@ -20,31 +20,41 @@ pub struct Mesh {
 /// degrees).
 const LEVEL_COSINE: f64 = 0.999;
 
+/// Why vertices and triangles are not a mesh. Numbers count from 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum MeshFault {
+    /// A coordinate is not finite.
+    #[error("its vertex {0} is not finite")]
+    Vertex(usize),
+    /// An index is out of bounds.
+    #[error("its triangle {0} refers to a missing vertex")]
+    Triangle(usize),
+    /// The mesh lacks triangles.
+    #[error("it has no triangles")]
+    Empty,
+}
+
 impl Mesh {
     /// Creates a mesh with finite coordinates and valid vertex indices.
     ///
     /// # Errors
-    /// A lower-case message if a coordinate is not finite, an index is out of bounds, or the
-    /// mesh lacks triangles.
-    pub fn new(vertices: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Result<Self, String> {
+    /// A coordinate is not finite, an index is out of bounds, or the mesh lacks triangles.
+    pub fn new(vertices: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Result<Self, MeshFault> {
         if let Some(vertex) = vertices
             .iter()
             .position(|vertex| !vertex.iter().all(|x| x.is_finite()))
         {
-            return Err(format!("its vertex {} is not finite", vertex + 1));
+            return Err(MeshFault::Vertex(vertex + 1));
         }
         let beyond = |idx: &u32| *idx as usize >= vertices.len();
         if let Some(triangle) = triangles
             .iter()
             .position(|corners| corners.iter().any(beyond))
         {
-            return Err(format!(
-                "its triangle {} refers to a missing vertex",
-                triangle + 1
-            ));
+            return Err(MeshFault::Triangle(triangle + 1));
         }
         if triangles.is_empty() {
-            return Err("it has no triangles".to_owned());
+            return Err(MeshFault::Empty);
         }
         Ok(Self {
             vertices,

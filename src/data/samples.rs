@@ -29,7 +29,46 @@ pub struct Series {
     pub steps: Steps,
 }
 
+/// Quantities with the number of their steps in one unit: 50,000 in a metre, a radian, or one; 2,000
+/// in 1 m/s or 1 rad/s; 50 in 1 N or 1 N·m.
+const RESOLUTIONS: [(&str, u32); 25] = [
+    ("x", 50_000),
+    ("y", 50_000),
+    ("z", 50_000),
+    ("qx", 50_000),
+    ("qy", 50_000),
+    ("qz", 50_000),
+    ("qw", 50_000),
+    ("opening", 50_000),
+    ("baseX", 50_000),
+    ("baseY", 50_000),
+    ("baseYaw", 50_000),
+    ("believedX", 50_000),
+    ("believedY", 50_000),
+    ("believedYaw", 50_000),
+    ("position", 50_000),
+    ("vx", 2_000),
+    ("vy", 2_000),
+    ("vz", 2_000),
+    ("wx", 2_000),
+    ("wy", 2_000),
+    ("wz", 2_000),
+    ("velocity", 2_000),
+    ("effort", 50),
+    ("contactForce", 50),
+    ("held", 1),
+];
+
 impl Series {
+    /// Returns the number of steps in one unit of a recorded quantity, or `None` if no quantity with
+    /// this local name is recorded.
+    pub fn resolution(quantity: &str) -> Option<u32> {
+        RESOLUTIONS
+            .iter()
+            .find(|(name, _)| *name == quantity)
+            .map(|(_, steps_per_unit)| *steps_per_unit)
+    }
+
     /// Creates an empty series.
     pub fn new(thing: &str, other: &str, quantity: &str, steps_per_unit: u32) -> Self {
         let (thing, other, quantity) = (thing.to_owned(), other.to_owned(), quantity.to_owned());

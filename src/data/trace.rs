@@ -27,6 +27,13 @@ pub struct Trace {
     pub forms: Vec<Form>,
     /// The robot's course during each performed action.
     pub robot_courses: Vec<RobotCourse>,
+    /// Names of the facts in the world vocabulary that were not recorded, sorted; empty for runs of
+    /// our own simulation. Values of these in the fields above mean nothing.
+    ///
+    /// The local name of a property (`tilt`), or of a thing about which nothing was recorded
+    /// (`gripper`); of a quantity over time, `samples/z` if no thing has it, `samples/each/z` if some
+    /// thing that can move lacks it, or `samples` if none was recorded.
+    pub lacks: Vec<String>,
 }
 
 /// The shape of a body, detailed enough for an outline. Mesh pieces are reduced to their outermost

@@ -4,7 +4,7 @@ use crate::snapshot::{POSITION, ROTATION};
 use crate::solids::{boxed, solid_of};
 use crate::thing_iri;
 use actcheck_base::{Course, Signal, names};
-use actcheck_data::Trace;
+use actcheck_data::{Series, Trace};
 
 /// Quantities of bodies that don't move.
 const AT_REST: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
@@ -50,7 +50,8 @@ pub(super) fn of_action(trace: &Trace, step: usize) -> Option<Course> {
         course.set_solids(thing_iri(&body.id), solids);
     }
     // Furniture that can slide has samples, too: they replace its constants.
-    for series in &samples.series {
+    let is_recorded = |series: &&Series| trace.lacks.binary_search(&series.quantity).is_err();
+    for series in samples.series.iter().filter(is_recorded) {
         let other = if series.other.is_empty() {
             String::new()
         } else {

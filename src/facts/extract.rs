@@ -79,7 +79,27 @@ fn extract_to(trace: &Trace, extent: Extent) -> RunFacts {
         ));
     }
     facts.terms = writer.terms;
+    facts.lacks = trace.lacks.iter().map(|local| names::w(local)).collect();
+    leave_out_missing(&mut facts);
     facts
+}
+
+/// Removes the facts whose values were not recorded: those of missing properties, and those about
+/// missing things.
+fn leave_out_missing(facts: &mut RunFacts) {
+    let missing: BTreeSet<TermId> = facts
+        .lacks
+        .iter()
+        .filter_map(|iri| facts.terms.id(&Term::iri(iri.as_str())))
+        .collect();
+    if missing.is_empty() {
+        return;
+    }
+    for triples in facts.snapshots.iter_mut().chain(&mut facts.during) {
+        triples.retain(|[subject, property, _]| {
+            !missing.contains(property) && !missing.contains(subject)
+        });
+    }
 }
 
 /// Returns designators, as IRIs, with their values. A value is an object if the scene has one of

@@ -63,7 +63,8 @@ pub use rdf_text::{RdfSyntax, rdf_text};
 pub use read_trace::Traces;
 pub use recheck::{NewestJudgements, Recheck, StoredJudgement};
 pub use record::{
-    CampaignEnd, CampaignRecord, FindingRecord, Repetition, RunRecord, RunStatus, SkillRecord,
+    CampaignEnd, CampaignRecord, EpisodeRecord, FindingRecord, Repetition, RunObject, RunRecord,
+    RunScene, RunStatus, SkillRecord,
 };
 pub use restore::Restore;
 pub use rows::{ActionDetail, CampaignRow, ObjectDetail, OutcomeRow, RunDetail, RunFilter, RunRow};

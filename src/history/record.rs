@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use actcheck_base::{Diagnostic, Judgement, Outcome, RunFacts, Shard};
-use actcheck_data::{Choice, Quality, Scene, Trace};
+use actcheck_data::{Choice, Pose, Quality, Role, Scene, SceneObject, Trace};
 
 /// A campaign, written before its first run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -55,6 +55,9 @@ pub struct CampaignRecord {
     pub program_digest: String,
     /// Version of the program's physics.
     pub physics: u32,
+    /// The engine that computed the episodes of an imported campaign, such as `MuJoCo 3.3.1`; `None`
+    /// if the campaign was simulated here.
+    pub imported_from: Option<String>,
 }
 
 /// A warning about the ontology or the rules of a campaign.
@@ -188,7 +191,7 @@ pub struct RunRecord {
     /// Every choice.
     pub choices: Vec<Choice>,
     /// The scene.
-    pub scene: Scene,
+    pub scene: RunScene,
     /// The trace.
     pub trace: Trace,
     /// The trace as facts.
@@ -199,10 +202,94 @@ pub struct RunRecord {
     pub judgements: Vec<Vec<Judgement>>,
     /// Errors of the simulation; `None` if the scene could not be simulated.
     pub quality: Option<Quality>,
+    /// The episode that it was imported from; `None` if it was simulated here.
+    pub episode: Option<EpisodeRecord>,
     /// RFC 3339.
     pub started: String,
     /// Wall time. Unit: seconds.
     pub wall_secs: f64,
     /// Wall-clock time from the campaign's start until the run was stored. Unit: seconds.
     pub elapsed_secs: f64,
+}
+
+/// The scene of a run, as a history keeps it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct RunScene {
+    /// Name of its world.
+    pub world: String,
+    /// Name of the robot.
+    pub robot: String,
+    /// Initial pose of the robot's base. Units: metres, metres, radians. Shape: x, y, heading.
+    pub base: [f64; 3],
+    /// Sensing errors with the local names of their terms ([`noise`](crate::noise)); empty for a
+    /// run that was not simulated here.
+    pub noise: Vec<(&'static str, f64)>,
+    /// Values of the designators: ids of objects, or names of locations.
+    pub designators: BTreeMap<String, Vec<String>>,
+    /// Its objects in order.
+    pub objects: Vec<RunObject>,
+}
+
+/// One object of a [`RunScene`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunObject {
+    /// Unique in the scene.
+    pub id: String,
+    /// Name of its model.
+    pub model: String,
+    /// IRI of its class.
+    pub category: String,
+    /// Its role in the scene.
+    pub role: Role,
+    /// Initial pose of the model's origin.
+    pub pose: Pose,
+    /// Unit: kilograms.
+    pub mass_kg: f64,
+    /// Sliding friction coefficient.
+    pub friction: f64,
+    /// Coefficient of restitution.
+    pub restitution: f64,
+}
+
+impl RunScene {
+    /// The record of a simulated scene.
+    pub fn of(scene: &Scene) -> Self {
+        Self {
+            world: scene.world.clone(),
+            robot: scene.robot.profile.name.clone(),
+            base: scene.robot.base,
+            noise: crate::noise(scene).into(),
+            designators: scene.designators.clone(),
+            objects: scene.objects.iter().map(RunObject::of).collect(),
+        }
+    }
+}
+
+impl RunObject {
+    fn of(object: &SceneObject) -> Self {
+        Self {
+            id: object.id.clone(),
+            model: object.model.name.clone(),
+            category: object.model.category.clone(),
+            role: object.role,
+            pose: object.pose,
+            mass_kg: object.mass_kg,
+            friction: object.friction,
+            restitution: object.restitution,
+        }
+    }
+}
+
+/// The origin of a run that was imported from an episode of another simulator, or of a robot.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct EpisodeRecord {
+    /// Path of the file, as given.
+    pub file: String,
+    /// Key of the episode in its file; empty if the file holds only one.
+    pub key: String,
+    /// Digest of the states as they were imported.
+    pub digest: String,
+    /// Everything that the recorder or the converter stated: engine, versions, environment, task,
+    /// source and notes.
+    pub about: BTreeMap<String, String>,
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::campaign_state::CampaignState;
-use crate::{Repetition, RunStatus, SkillRecord};
+use crate::{EpisodeRecord, Repetition, RunStatus, SkillRecord};
 use actcheck_base::{Judgement, Outcome};
 use actcheck_data::Role;
 
@@ -81,6 +81,8 @@ pub struct CampaignRow {
     pub ontology_digest: String,
     /// The program that performed actions; `None` if the reference skills performed all.
     pub skill: Option<SkillRecord>,
+    /// The engine of an imported campaign; `None` if it was simulated here.
+    pub imported_from: Option<String>,
 }
 
 impl CampaignRow {
@@ -88,6 +90,7 @@ impl CampaignRow {
         let (record, end) = (&state.record, state.end.as_ref());
         Self {
             id: record.id.clone(),
+            imported_from: record.imported_from.clone(),
             name: record.name.clone(),
             started: record.started.clone(),
             ended: end.map(|end| end.ended.clone()),
@@ -149,6 +152,8 @@ pub struct RunDetail {
     pub elapsed_secs: f64,
     /// Name of the world.
     pub world: String,
+    /// The episode that it was imported from; `None` if it was simulated here.
+    pub episode: Option<EpisodeRecord>,
     /// Version of the program that ran it.
     pub program_version: String,
     /// Initial pose of the base. Units: metres, metres, radians. Shape: x, y, heading.

@@ -7,10 +7,11 @@ use oxigraph::model::Literal;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    ActionDetail, ObjectDetail, Repetition, RunDetail, RunRecord, RunRow, RunStatus, SceneDigest,
+    ActionDetail, EpisodeRecord, ObjectDetail, Repetition, RunDetail, RunObject, RunRecord, RunRow,
+    RunStatus, SceneDigest,
 };
 use actcheck_base::Judgement;
-use actcheck_data::{ActionEnd, ActionTrace, Quality, Role, Scene, SceneObject};
+use actcheck_data::{ActionEnd, ActionTrace, Quality, Role, Scene};
 
 /// Local names of the terms for sensing errors, in the order of [`noise`].
 pub const NOISE_TERMS: [&str; 13] = [
@@ -77,6 +78,8 @@ pub(crate) struct StoredRun {
     pub elapsed_secs: f64,
     /// Version of the program that ran it.
     pub program_version: String,
+    /// The episode that it was imported from.
+    pub episode: Option<EpisodeRecord>,
     pub scene: StoredScene,
     /// Number of states between actions.
     pub states: u32,
@@ -91,8 +94,8 @@ pub(crate) struct StoredScene {
     pub robot: String,
     /// Initial pose of the base. Units: metres, metres, radians.
     pub base: [f64; 3],
-    /// Sensing errors, in the order of [`crate::NOISE_TERMS`].
-    pub noise: [f64; 13],
+    /// Sensing errors, in the order of [`crate::NOISE_TERMS`]; empty for an imported run.
+    pub noise: Vec<f64>,
     pub designators: BTreeMap<String, Vec<String>>,
     /// The objects in the order of the scene.
     pub objects: Vec<ObjectDetail>,
@@ -138,6 +141,7 @@ impl StoredRun {
             wall_secs: record.wall_secs,
             elapsed_secs: record.elapsed_secs,
             program_version: env!("CARGO_PKG_VERSION").to_owned(),
+            episode: record.episode.clone(),
             scene: StoredScene::of(record),
             states: u32::try_from(record.facts.snapshots.len()).unwrap_or(u32::MAX),
             actions: record
@@ -222,12 +226,13 @@ impl StoredRun {
             wall_secs: self.wall_secs,
             elapsed_secs: self.elapsed_secs,
             world: self.scene.world.clone(),
+            episode: self.episode.clone(),
             program_version: self.program_version.clone(),
             robot_base: self.scene.base,
             noise: crate::NOISE_TERMS
                 .into_iter()
                 .map(str::to_owned)
-                .zip(self.scene.noise)
+                .zip(self.scene.noise.iter().copied())
                 .collect(),
             designators: sorted(&self.scene.designators),
             objects: self.objects(),
@@ -255,9 +260,9 @@ impl StoredScene {
         let scene = &record.scene;
         Self {
             world: scene.world.clone(),
-            robot: scene.robot.profile.name.clone(),
-            base: scene.robot.base,
-            noise: noise(scene).map(|(_, value)| value),
+            robot: scene.robot.clone(),
+            base: scene.base,
+            noise: scene.noise.iter().map(|(_, value)| *value).collect(),
             designators: scene.designators.clone(),
             objects: scene
                 .objects
@@ -268,7 +273,7 @@ impl StoredScene {
     }
 }
 
-fn stored_object(record: &RunRecord, object: &SceneObject) -> ObjectDetail {
+fn stored_object(record: &RunRecord, object: &RunObject) -> ObjectDetail {
     let extremes = || {
         let actions = record.trace.actions.iter();
         actions
@@ -276,12 +281,12 @@ fn stored_object(record: &RunRecord, object: &SceneObject) -> ObjectDetail {
             .filter(|extremes| extremes.id == object.id)
     };
     let [x, y, z] = object.pose.position;
-    let base = record.scene.robot.base;
+    let base = record.scene.base;
     let is_neither = object.role != Role::Platform && object.role != Role::Target;
     ObjectDetail {
         id: object.id.clone(),
-        model: object.model.name.clone(),
-        category: object.model.category.clone(),
+        model: object.model.clone(),
+        category: object.category.clone(),
         role: object.role,
         x,
         y,
@@ -303,8 +308,8 @@ fn stored_object(record: &RunRecord, object: &SceneObject) -> ObjectDetail {
 /// Horizontal distance from an object to the nearest other object that satisfies `among`.
 fn nearest(
     record: &RunRecord,
-    object: &SceneObject,
-    among: impl Fn(&SceneObject) -> bool,
+    object: &RunObject,
+    among: impl Fn(&RunObject) -> bool,
 ) -> Option<f64> {
     let [x, y, _] = object.pose.position;
     record
@@ -430,11 +435,17 @@ pub(crate) mod tests {
             wall_secs: 1.25,
             elapsed_secs: 2.5,
             program_version: "0.1.0".to_owned(),
+            episode: (index == 3).then(|| EpisodeRecord {
+                file: "demo.hdf5".to_owned(),
+                key: "demo_1".to_owned(),
+                digest: "0123".to_owned(),
+                about: [("engine".to_owned(), "MuJoCo".to_owned())].into(),
+            }),
             scene: StoredScene {
                 world: "room".to_owned(),
                 robot: "fixed_arm".to_owned(),
                 base: [0.5, -1.0, 0.0],
-                noise: [0.0; 13],
+                noise: vec![0.0; 13],
                 designators: [("pickObject".to_owned(), vec!["glass_1".to_owned()])].into(),
                 objects: vec![
                     object("glass_1", Role::Target, 0.2),

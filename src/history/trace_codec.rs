@@ -33,7 +33,7 @@ pub(super) enum CodecFault {
 const MOST_SAMPLES: usize = 1 << 26;
 
 /// First part: choices, states, actions, time between frames, names of tracks, hash, map, forms of
-/// bodies, and the courses of the robot.
+/// bodies, the courses of the robot, and the missing facts.
 type Head = (
     Vec<Choice>,
     Vec<Snapshot>,
@@ -44,6 +44,7 @@ type Head = (
     SceneMap,
     Vec<Form>,
     Vec<RobotCourse>,
+    Vec<String>,
 );
 
 /// Encodes the choices and the data from which facts are extracted.
@@ -62,6 +63,7 @@ pub(super) fn encode_head(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, 
         &trace.map,
         &trace.forms,
         &trace.robot_courses,
+        &trace.lacks,
     );
     postcard::to_stdvec(&head).map_err(CodecFault::Encoding)
 }
@@ -218,7 +220,8 @@ pub(super) fn head_choices(head: &[u8]) -> Result<Vec<Choice>, CodecFault> {
 /// It is damaged.
 pub(super) fn decode_head(head: &[u8]) -> Result<(Vec<Choice>, Trace), CodecFault> {
     let head: Head = postcard::from_bytes(head).map_err(CodecFault::States)?;
-    let (choices, snapshots, actions, period_secs, names, hash, map, forms, robot_courses) = head;
+    let (choices, snapshots, actions, period_secs, names, hash, map, forms, robot_courses, lacks) =
+        head;
     let frames = Frames {
         period_secs,
         names,
@@ -232,6 +235,7 @@ pub(super) fn decode_head(head: &[u8]) -> Result<(Vec<Choice>, Trace), CodecFaul
         map,
         forms,
         robot_courses,
+        lacks,
     };
     Ok((choices, trace))
 }

@@ -41,6 +41,7 @@ fn write_record(record: &CampaignRecord, statements: &mut Statements<'_>) {
         .optional("act:timeBudget", record.time_secs)
         .optional("act:untilWidth", record.until_width)
         .optional("act:maxFailures", record.max_failures)
+        .optional("act:importedFrom", record.imported_from.as_deref())
         .has("act:strategy", record.strategy.as_str())
         .has("prov:startedAtTime", Value::Time(&record.started))
         .has("act:program", program(&record.program_version).as_str())

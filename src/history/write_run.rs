@@ -113,6 +113,17 @@ fn write_run(stored: &StoredRun, campaign: &str, run: &NamedNode, statements: &m
             stored.quality.map(|quality| quality.energy_gain_j),
         )
         .has("act:program", program(&stored.program_version).as_str());
+    if let Some(episode) = &stored.episode {
+        let about = about
+            .has("act:episodeFile", episode.file.as_str())
+            .has("act:episodeDigest", episode.digest.as_str());
+        let stated = |name: &str| episode.about.get(name).map(String::as_str);
+        about
+            .optional("act:engine", stated("engine"))
+            .optional("act:engineVersion", stated("engine_version"))
+            .optional("act:environment", stated("environment"))
+            .optional("act:taskText", stated("task"));
+    }
     write_designators(&stored.scene.designators, stored, &mut about);
 }
 

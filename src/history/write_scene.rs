@@ -28,7 +28,7 @@ pub(super) fn write(scene: &StoredScene, run: &NamedNode, statements: &mut State
     {
         about.has(property, value);
     }
-    for (name, value) in NOISE_TERMS.into_iter().zip(scene.noise) {
+    for (name, value) in NOISE_TERMS.into_iter().zip(scene.noise.iter().copied()) {
         about.has(&format!("act:{name}"), value);
     }
     if statements.wants(&OF_OBJECTS) {

@@ -195,6 +195,7 @@ fn action(graph: &Graph, iri: String) -> Action {
         performed_in: iris(&names::act("performedIn")).into_iter().next(),
         success_properties: iris(&names::act("successProperty")),
         preconditions: iris(&names::act("precondition")),
+        premises: iris(&names::act("premise")),
         parameters: locals(stated(&names::act("hasParameter")).into_iter()),
         iri,
     }

@@ -57,9 +57,10 @@ fn owners(graph: &Graph, iri: &str) -> BTreeSet<String> {
 }
 
 /// Local names of the predicates in the paper's namespace that have a meaning here.
-const PREDICATES: [&str; 8] = [
+const PREDICATES: [&str; 9] = [
     "successProperty",
     "precondition",
+    "premise",
     "performedIn",
     "hasParameter",
     "needsParameter",
@@ -180,10 +181,14 @@ pub(super) fn never_judged(
     let (mut reported, mut explained) = (BTreeSet::new(), BTreeSet::new());
     for statement in graph.statements() {
         let states = |predicate: &str| graph.means(&statement.predicate, &names::act(predicate));
-        let kind = match (states("successProperty"), states("precondition")) {
-            (true, _) => "success properties",
-            (false, true) => "preconditions",
-            (false, false) => continue,
+        let kinds = [
+            ("successProperty", "success properties"),
+            ("precondition", "preconditions"),
+            ("premise", "premises"),
+        ];
+        let stated = kinds.into_iter().find(|(predicate, _)| states(predicate));
+        let Some((_, kind)) = stated else {
+            continue;
         };
         let Some(subject) = statement
             .subject
@@ -198,7 +203,9 @@ pub(super) fn never_judged(
         }
     }
     let has = |action: &Action, iri: &String| {
-        action.success_properties.contains(iri) || action.preconditions.contains(iri)
+        action.success_properties.contains(iri)
+            || action.preconditions.contains(iri)
+            || action.premises.contains(iri)
     };
     for iri in graph.individuals(&names::act("Property")) {
         if !explained.contains(iri.as_str()) && !actions.values().any(|action| has(action, &iri)) {
@@ -296,7 +303,7 @@ fn faults_of(graph: &Graph, known: &Known, name: &str, action: &Action) -> Vec<A
             unknown_parameter(graph, known, statement, &format!("the action `{name}` has"));
         faults.extend(unknown.map(ActionFault::inherited));
     }
-    for predicate in ["successProperty", "precondition"] {
+    for predicate in ["successProperty", "precondition", "premise"] {
         for statement in inherited(graph, &action.iri, &names::act(predicate)) {
             let Some(property) = statement.object.as_iri() else {
                 continue;

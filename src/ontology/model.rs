@@ -49,8 +49,12 @@ pub struct Action {
     pub performed_in: Option<String>,
     /// IRIs of its success properties, including inherited ones, in the order of the ontology text.
     pub success_properties: Vec<String>,
-    /// IRIs of properties that must hold for the success properties to be applicable.
+    /// IRIs of properties that must hold before the action for the success properties to be
+    /// applicable.
     pub preconditions: Vec<String>,
+    /// IRIs of properties of the first state of a run: if one does not hold, the scene is not the
+    /// one that the task is about, and the success properties are inapplicable.
+    pub premises: Vec<String>,
     /// Local names of its designators.
     pub parameters: BTreeSet<String>,
 }

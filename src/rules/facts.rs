@@ -123,6 +123,7 @@ impl Facts {
             during: &self.during,
             parameters: &self.parameters,
             course: self.course.as_ref(),
+            lacks: &[],
         }
     }
 }

@@ -22,6 +22,6 @@ mod surroundings;
 pub use draw::{Discard, draw};
 pub use floor_plan::{FloorPlan, Outline};
 pub use kept_free::is_blocked;
-pub use overlap::{CLEARANCE_M, Solid};
+pub use overlap::{CLEARANCE_M, Solid, convex_shape};
 pub use parameters::{Parameter, ParameterKind};
 pub use space::Space;

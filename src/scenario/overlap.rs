@@ -33,7 +33,7 @@ impl Solid {
         let parts: Vec<(ParryPose, Arc<dyn ParryShape>, Aabb)> = parts
             .iter()
             .filter_map(|part| {
-                let (shape, model_from_shape) = parry_shape(&part.shape)?;
+                let (shape, model_from_shape) = convex_shape(&part.shape)?;
                 let at = to_parry(&(world_from_model * part.pose.to_isometry() * model_from_shape));
                 let around = shape.compute_aabb(&at);
                 Some((at, shape, around))
@@ -71,7 +71,7 @@ impl Solid {
 
 /// Returns the engine's shape and its pose in our shape's frame (the engine's cylinders are along
 /// y). Returns `None` for a tube, which is not a single convex shape.
-fn parry_shape(shape: &Shape) -> Option<(Arc<dyn ParryShape>, Isometry3<f64>)> {
+pub fn convex_shape(shape: &Shape) -> Option<(Arc<dyn ParryShape>, Isometry3<f64>)> {
     let upright = Isometry3::identity();
     Some(match shape {
         Shape::Box { size: [x, y, z] } => {

@@ -22,7 +22,8 @@ pub enum Fate {
 
 /// Returns the outcomes of an action's success properties, in the action's order.
 ///
-/// `findings` holds the rules' findings for these properties and for the action's preconditions. It
+/// `findings` holds the rules' findings for these properties, and for the action's preconditions and
+/// premises. It
 /// is ignored unless the fate is `Completed`. A property without findings is `broken`: verdicts are
 /// never invented.
 pub fn judge(
@@ -32,7 +33,8 @@ pub fn judge(
     fate: &Fate,
     rule_digest: impl Fn(&str) -> String,
 ) -> Vec<Judgement> {
-    let unmet = unmet_precondition(ontology, action, findings);
+    let unmet = unmet(ontology, &action.premises, "premise", findings)
+        .or_else(|| unmet_precondition(ontology, action, findings));
     let decide = |iri: &String| {
         let property = ontology.properties.get(iri);
         let (outcome, margin, witness) = match fate {
@@ -88,7 +90,17 @@ fn unmet_precondition(
     action: &Action,
     findings: &BTreeMap<String, Result<Findings, RuleFault>>,
 ) -> Option<(Outcome, Option<f64>, String)> {
-    action.preconditions.iter().find_map(|iri| {
+    unmet(ontology, &action.preconditions, "precondition", findings)
+}
+
+/// Returns the outcome that all success properties share if one of some conditions does not hold.
+fn unmet(
+    ontology: &Ontology,
+    conditions: &[String],
+    kind: &str,
+    findings: &BTreeMap<String, Result<Findings, RuleFault>>,
+) -> Option<(Outcome, Option<f64>, String)> {
+    conditions.iter().find_map(|iri| {
         let property = ontology.properties.get(iri);
         let label = property.map_or_else(|| names::local(iri), |p| p.label.as_str());
         match findings.get(iri).map(|result| outcome_of(result, property)) {
@@ -96,17 +108,15 @@ fn unmet_precondition(
             Some((Outcome::Failed, _, words)) => Some((
                 Outcome::Inapplicable,
                 None,
-                format!("the precondition `{label}` does not hold: {words}"),
+                format!("the {kind} `{label}` does not hold: {words}"),
             )),
-            Some((outcome, _, words)) => Some((
-                outcome,
-                None,
-                format!("the precondition `{label}`: {words}"),
-            )),
+            Some((outcome, _, words)) => {
+                Some((outcome, None, format!("the {kind} `{label}`: {words}")))
+            }
             None => Some((
                 Outcome::Broken,
                 None,
-                format!("the precondition `{label}` was not evaluated"),
+                format!("the {kind} `{label}` was not evaluated"),
             )),
         }
     })

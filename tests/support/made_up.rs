@@ -70,6 +70,7 @@ pub fn run(
                 .collect(),
         });
     RunDetail {
+        episode: None,
         row: RunRow {
             run: id.clone(),
             campaign: campaign.to_owned(),

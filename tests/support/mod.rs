@@ -5,6 +5,7 @@ pub mod chromium;
 pub mod expected;
 pub mod exported;
 pub mod foreign;
+pub mod judge_values;
 pub mod line;
 pub mod look;
 pub mod made_up;

@@ -98,7 +98,10 @@ pub fn shrink(
     check_candidates(env, index, recorded)?;
     let recorded = drop_rejected_tries(recorded);
     let first = remake(env, index, &recorded, options)?;
-    let may_block = env.campaign.nav_may_block || scenario::is_blocked(&first.scene);
+    let mut choices = Choices::recorded(&first.choices);
+    let scene = scenario::draw(&env.space, env.test_of(index), &mut choices);
+    let may_block =
+        env.campaign.nav_may_block || scene.is_ok_and(|scene| scenario::is_blocked(&scene));
     let subject = Subject {
         env,
         index,

@@ -5,7 +5,9 @@
 
 mod commands;
 mod config;
+mod episodes;
 mod history;
+mod judge;
 mod models;
 mod ontology;
 mod reports;
@@ -38,12 +40,14 @@ pub(super) struct Area {
 }
 
 /// All areas, in the order in which a campaign passes through them.
-pub(super) static AREAS: [Area; 10] = [
+pub(super) static AREAS: [Area; 12] = [
     config::CONFIG,
     models::MODELS,
     ontology::ONTOLOGY,
     scenes::SCENES,
+    episodes::EPISODES,
     rules::RULES,
+    judge::JUDGE,
     history::HISTORY,
     reports::TABLES,
     reports::HEALTH,

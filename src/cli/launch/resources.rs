@@ -1,6 +1,7 @@
 //! `--resources`: the needs of a shard, and where it runs.
 
 use crate::launch::args::On;
+use crate::option_fault::OptionFault;
 use actcheck_base::{Diagnostic, Diagnostics, did_you_mean};
 use actcheck_config::duration_secs;
 
@@ -93,10 +94,10 @@ impl Resources {
         faults.or(resources)
     }
 
-    fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
+    fn set(&mut self, key: &str, value: &str) -> Result<(), OptionFault> {
         // Files and commands of schedulers hold the value in one line.
         if value.is_empty() || value.chars().any(char::is_control) {
-            return Err("the value is missing, or has a control character".to_owned());
+            return Err("the value is missing, or has a control character".into());
         }
         match key {
             "cpus" => {

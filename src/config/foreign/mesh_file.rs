@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::foreign::collada;
 use actcheck_base::{Diagnostic, Diagnostics, Files, Source};
-use actcheck_data::Mesh;
+use actcheck_data::{Mesh, MeshFault};
 
 /// Largest number of triangles: more than any collision shape needs, and a larger file could
 /// exhaust memory.
@@ -35,7 +35,7 @@ pub(crate) enum MeshFileFault {
     Syntax(String),
     /// Its points and triangles are not a mesh.
     #[error("{0}")]
-    Mesh(String),
+    Mesh(#[from] MeshFault),
 }
 
 /// The contents of a mesh file.
@@ -172,9 +172,9 @@ pub(crate) fn checked(
     if triangles.len() > MOST_TRIANGLES {
         return Err(MeshFileFault::TooManyTriangles(triangles.len()));
     }
-    let mesh = Mesh::new(vertices, triangles).map_err(MeshFileFault::Mesh)?;
+    let mesh = Mesh::new(vertices, triangles)?;
     let welded = mesh.welded();
-    Mesh::new(welded.vertices, welded.triangles).map_err(MeshFileFault::Mesh)
+    Ok(Mesh::new(welded.vertices, welded.triangles)?)
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::check::checking::unique;
+use crate::check::facts_read::FactsRead;
 use crate::check::formulas::Bound;
 use crate::engine::budget::Budget;
 use crate::engine::evaluate::{Layers, Planned, Tables, evaluate, fault};
@@ -86,6 +87,7 @@ pub(crate) struct Judge {
     pub(crate) digest: String,
     pub(crate) label: String,
     pub(crate) rules: JudgeRules,
+    pub(crate) reads: FactsRead,
 }
 
 /// Rules by language.
@@ -111,7 +113,8 @@ impl RuleBook {
     /// property.
     ///
     /// A property that exceeds the budget or meets an invalid value gets a fault instead of
-    /// findings. The others are not affected.
+    /// findings. The others are not affected. A property whose outcome depends on facts that were not
+    /// recorded ([`ActionFacts::lacks`]) is inapplicable.
     pub fn judge(
         &self,
         facts: &ActionFacts<'_>,
@@ -146,6 +149,11 @@ impl RuleBook {
             // A property's new things don't depend on the properties that are judged with it.
             universe.label_from(label);
             let judge = self.properties.get(iri);
+            let unevaluated = judge.and_then(|judge| judge.reads.unevaluated(facts.lacks));
+            if let Some(findings) = unevaluated {
+                results.insert(iri.clone(), Ok(findings));
+                continue;
+            }
             let result = match judge {
                 None => Err(RuleFault::Value(format!("unknown property {iri}"))),
                 Some(Judge {
@@ -181,6 +189,13 @@ impl RuleBook {
                     query.judge(&self.statements, graphs, &universe, budget)
                 }
             };
+            let result = result.map(|found| match judge {
+                Some(judge) => judge
+                    .reads
+                    .certain(found, facts.lacks)
+                    .unwrap_or_else(|undecided| *undecided),
+                None => found,
+            });
             results.insert(iri.clone(), result);
         }
         results
@@ -215,6 +230,14 @@ impl RuleBook {
         budget: &Budget,
     ) -> BTreeMap<String, Result<Findings, RuleFault>> {
         self.judge_as(facts, properties, budget, true)
+    }
+
+    /// Returns the names of the facts that were not recorded ([`ActionFacts::lacks`]) and that the
+    /// rules of a property (by IRI) read. If its outcome is decided, it is certain without them.
+    pub fn missing<'f>(&self, facts: &ActionFacts<'f>, property: &str) -> Vec<&'f str> {
+        self.properties
+            .get(property)
+            .map_or_else(Vec::new, |judge| judge.reads.missing(facts.lacks))
     }
 
     /// Returns whether a property has an `implies` whose left side may never hold while the

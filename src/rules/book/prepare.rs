@@ -10,6 +10,7 @@ use crate::book::judge::{Judge, JudgeRules, RuleBook};
 use crate::book::owl::owl_closure_within;
 use crate::book::parts::{extend, gather_state, gathers_state, needed, split_fixed, split_timed};
 use crate::check::checking::{Checking, Role, unique, used_names};
+use crate::check::facts_read::{Derivations, FactsRead};
 use crate::check::formulas::{self, Bound};
 use crate::check::ranges::Ranges;
 use crate::check::sides::Sides;
@@ -27,7 +28,9 @@ use crate::model::given::Phases;
 use crate::model::program::{CheckedProgram, Predicates, Rule};
 use crate::model::universe::Universe;
 #[cfg(feature = "sparql")]
-use crate::sparql::{dataset::Statements, query::Query, unchanging::is_unchanging};
+use crate::sparql::{
+    dataset::Statements, facts_read::facts_read, query::Query, unchanging::is_unchanging,
+};
 use crate::syntax::{Syntax, parse};
 use crate::temporal::{add_margin, add_moment, define_moment, mark_consequents, reads_course};
 use actcheck_base::{Diagnostic, Diagnostics, Digest, Term, TermId, Terms};
@@ -134,7 +137,15 @@ impl Preparing {
         if split {
             library.rules.extend(gather_state(&mut predicates));
         }
-        self.assemble(ontology, phases, library, programs, &properties, predicates)
+        let reads = self.reads(ontology, &library, &programs, &properties, &predicates);
+        let mut book =
+            self.assemble(ontology, phases, library, programs, &properties, predicates)?;
+        for (iri, reads) in reads {
+            if let Some(judge) = book.properties.get_mut(&iri) {
+                judge.reads = reads;
+            }
+        }
+        Ok(book)
     }
 
     /// Parses all libraries and all Datalog properties. Each property gets a scope, numbered from 1.
@@ -166,6 +177,40 @@ impl Preparing {
             }
         }
         (libraries, properties)
+    }
+
+    /// Returns the facts that each property reads.
+    fn reads(
+        &self,
+        ontology: &Ontology,
+        library: &CheckedProgram,
+        programs: &BTreeMap<usize, CheckedProgram>,
+        properties: &[(usize, &Property, Syntax)],
+        predicates: &Predicates,
+    ) -> BTreeMap<String, FactsRead> {
+        let derivations = Derivations::new(library, predicates, &self.terms);
+        let mut reads = BTreeMap::new();
+        for (scope, property, _) in properties {
+            if let Some(program) = programs.get(scope) {
+                reads.insert(
+                    property.iri.clone(),
+                    derivations.of_program(program, *scope),
+                );
+            }
+        }
+        #[cfg(feature = "sparql")]
+        for property in ontology.properties.values() {
+            if property.rule.language == RuleLanguage::Sparql {
+                let read = facts_read(&property.rule.source.text);
+                reads.insert(
+                    property.iri.clone(),
+                    derivations.of_query(&read.properties, read.of_any),
+                );
+            }
+        }
+        #[cfg(not(feature = "sparql"))]
+        let _ = ontology;
+        reads
     }
 
     fn assemble(
@@ -532,6 +577,7 @@ fn judge(ontology: &Ontology, property: &Property, rules: JudgeRules) -> Judge {
         digest: digest.finish(),
         label: property.label.clone(),
         rules,
+        reads: FactsRead::default(),
     }
 }
 

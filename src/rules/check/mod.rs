@@ -5,6 +5,7 @@
 
 pub(crate) mod checking;
 mod expressions;
+pub(crate) mod facts_read;
 pub(crate) mod formulas;
 mod left;
 mod making;

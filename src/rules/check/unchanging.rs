@@ -4,7 +4,7 @@
 //! Such facts are the ontology, the designators, the state before the action, and constant
 //! properties of bodies, joints and the map. Every other fact, and every fact about the course of
 //! the action, may depend on the robot, so that only rules that never read one are reported. A
-//! precondition is supposed to read the state before the action.
+//! precondition or a premise is supposed to read the state before the action.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -26,7 +26,7 @@ pub(crate) fn warning(
     if ontology
         .actions
         .values()
-        .any(|action| has(&action.preconditions))
+        .any(|action| has(&action.preconditions) || has(&action.premises))
     {
         return None;
     }

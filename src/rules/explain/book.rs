@@ -53,6 +53,9 @@ impl RuleBook {
         budget: &Budget,
     ) -> Result<Explanation, RuleFault> {
         let judge = self.property(property)?;
+        if let Some(findings) = judge.reads.unevaluated(facts.lacks) {
+            return Ok(without_proof(&judge.label, findings));
+        }
         match &judge.rules {
             JudgeRules::Datalog {
                 planned, verdict, ..
@@ -62,13 +65,15 @@ impl RuleBook {
                     None => base.insert(self.base(facts, budget)?),
                 };
                 let evaluated = self.evaluate_for_proofs(base, planned, verdict, budget)?;
+                let findings = match judge
+                    .reads
+                    .certain(evaluated.findings.clone()?, facts.lacks)
+                {
+                    Ok(findings) => findings,
+                    Err(undecided) => return Ok(without_proof(&judge.label, *undecided)),
+                };
                 let context = evaluated.context(self, base, planned);
-                Ok(explained(
-                    &judge.label,
-                    evaluated.findings.clone()?,
-                    verdict,
-                    &context,
-                ))
+                Ok(explained(&judge.label, findings, verdict, &context))
             }
             #[cfg(feature = "sparql")]
             JudgeRules::Sparql(_) => {
@@ -312,6 +317,19 @@ fn explained(
     explanation.findings = Some(findings);
     explanation.deciding = context.deciding_in(&explanation.to_text());
     explanation
+}
+
+/// Explains a property that can't be decided without facts that were not recorded.
+fn without_proof(label: &str, findings: Findings) -> Explanation {
+    Explanation {
+        title: label.to_owned(),
+        findings: Some(findings),
+        proofs: Vec::new(),
+        miss: None,
+        unknown: Vec::new(),
+        notes: Vec::new(),
+        deciding: Vec::new(),
+    }
 }
 
 /// Explains a query by its rows: it has no proof tree.

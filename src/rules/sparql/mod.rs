@@ -4,6 +4,7 @@
 //! Never: copies the ontology for an action, or exceeds the budget of an evaluation.
 
 pub(crate) mod dataset;
+pub(crate) mod facts_read;
 mod ledger;
 mod parsed;
 pub(crate) mod query;

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use crate::temporal::formula::{CheckedFormula, Quantity, Thing};
 use crate::temporal::gap::gaps;
 use actcheck_base::{Course, Signal, names, tilt_of, yaw_of};
 
@@ -59,6 +60,45 @@ pub(crate) fn known_quantity(local: &str) -> Option<usize> {
         .iter()
         .find(|(name, _)| *name == local)
         .map(|(_, things)| *things)
+}
+
+/// Returns the IRIs of the facts without which a formula has no value.
+pub(crate) fn quantities_read(formula: &CheckedFormula) -> Vec<String> {
+    let mut read = Vec::new();
+    formula.visit(&mut |part| {
+        let quantities = match part {
+            CheckedFormula::Compare { left, right, .. } => vec![left, right],
+            CheckedFormula::Truth { quantity, .. } => vec![quantity],
+            _ => Vec::new(),
+        };
+        quantities
+            .into_iter()
+            .for_each(|quantity| recorded_for(quantity, &mut read));
+    });
+    read
+}
+
+/// Appends the IRIs of the recorded quantities that a number over time needs, and of the things that
+/// it names.
+fn recorded_for(quantity: &Quantity, read: &mut Vec<String>) {
+    match quantity {
+        Quantity::Number(_) | Quantity::Variable(_) => {}
+        Quantity::Recorded { iri, things } => {
+            read.extend(things.iter().filter_map(|thing| match thing {
+                Thing::Constant(iri) => Some(iri.clone()),
+                Thing::Variable(_) => None,
+            }));
+            match (iri.strip_prefix(names::W), things.len()) {
+                (Some("angularSpeed"), _) => {
+                    read.extend(["wx", "wy", "wz"].map(names::w));
+                }
+                (Some("gap"), _) => read.extend(["sizeX", "sizeY", "sizeZ"].map(names::w)),
+                (Some("touches"), 2) => read.push(names::w("contactForce")),
+                _ => read.push(iri.clone()),
+            }
+        }
+        Quantity::Call(_, args) => args.iter().for_each(|arg| recorded_for(arg, read)),
+    }
 }
 
 /// Returns the names of all quantities of the world vocabulary.

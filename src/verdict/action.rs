@@ -2,26 +2,31 @@
 
 use std::collections::BTreeMap;
 
-use crate::Failure;
-use actcheck_base::{ActionFacts, Findings, Judgement, Outcome, RuleFault};
+use crate::judge::{Fate, judge};
+use actcheck_base::{ActionFacts, Findings, Judgement, Outcome, RuleFault, Triple};
 use actcheck_data::ActionEnd;
 use actcheck_ontology::{Action, Ontology};
 use actcheck_rules::{Budget, RuleBook};
-use actcheck_verdict::{Fate, judge};
+
+/// The evaluation of rules was interrupted: the budget's `stop` was set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("interrupted")]
+pub struct Interrupted;
 
 /// Returns the outcomes of an action's success properties. Rules are evaluated only for completed
-/// actions, those of preconditions for the state before the action alone.
+/// actions, those of preconditions for the state before the action alone, those of premises for the
+/// first state of the run (`start`).
 ///
 /// # Errors
-/// [`Failure::Interrupted`] if the budget's `stop` is set during a long evaluation.
-pub(super) fn judge_action(
+/// [`Interrupted`] if the budget's `stop` is set during a long evaluation.
+pub fn judge_action(
     ontology: &Ontology,
     rules: &RuleBook,
     action: &Action,
     end: &ActionEnd,
-    facts: Option<ActionFacts<'_>>,
+    (start, facts): (&[Triple], Option<ActionFacts<'_>>),
     budget: &Budget,
-) -> Result<Vec<Judgement>, Failure> {
+) -> Result<Vec<Judgement>, Interrupted> {
     let fate = match end {
         ActionEnd::Completed => Fate::Completed,
         ActionEnd::Broken(reason) => Fate::Broken(reason.clone()),
@@ -35,6 +40,15 @@ pub(super) fn judge_action(
             found.extend(uninterrupted(rules.held_before(
                 &facts,
                 &action.preconditions,
+                budget,
+            ))?);
+            let first = ActionFacts {
+                before: start,
+                ..facts
+            };
+            found.extend(uninterrupted(rules.held_before(
+                &first,
+                &action.premises,
                 budget,
             ))?);
             found
@@ -53,13 +67,13 @@ pub(super) fn judge_action(
 
 type Found = BTreeMap<String, Result<Findings, RuleFault>>;
 
-/// Returns the findings, or [`Failure::Interrupted`] if an evaluation was interrupted.
-fn uninterrupted(found: Found) -> Result<Found, Failure> {
+/// Returns the findings, or [`Interrupted`] if an evaluation was interrupted.
+fn uninterrupted(found: Found) -> Result<Found, Interrupted> {
     let interrupted = found
         .values()
         .any(|found| *found == Err(RuleFault::Interrupted));
     if interrupted {
-        Err(Failure::Interrupted)
+        Err(Interrupted)
     } else {
         Ok(found)
     }
@@ -71,7 +85,7 @@ fn note_held_before(
     facts: &ActionFacts<'_>,
     judgements: &mut [Judgement],
     budget: &Budget,
-) -> Result<(), Failure> {
+) -> Result<(), Interrupted> {
     let asked: Vec<String> = judgements
         .iter()
         .filter(|judgement| {
@@ -98,7 +112,7 @@ fn note_vacuous(
     facts: &ActionFacts<'_>,
     judgements: &mut [Judgement],
     budget: &Budget,
-) -> Result<(), Failure> {
+) -> Result<(), Interrupted> {
     let asked: Vec<String> = judgements
         .iter()
         .filter(|judgement| {

@@ -1,0 +1,259 @@
+//! `actcheck.Judge`: the same outcomes as `recheck`, in Rust and in Python.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+use std::sync::atomic::AtomicBool;
+
+use actcheck::base::{Files, Judgement, names};
+use actcheck::campaign::{RuleSet, judge_stored};
+use actcheck::data::Trace;
+use actcheck::history::{History, RunFilter, RunRow};
+use actcheck_judge::{Call, Judge};
+use serde_json::{Value, json};
+
+use crate::support::{actcheck, foreign, judge_values, project, root, stderr, stdout};
+
+/// Number of outcomes to compare. Without it, a small campaign is compared.
+const OUTCOMES: &str = "ACTCHECK_JUDGE_OUTCOMES";
+/// Ontologies whose rules are compared: with those about time and about the robot itself.
+const ONTOLOGIES: [&str; 3] = ["actions.ttl", "time.ttl", "extra.ttl"];
+
+/// One performed action with the outcomes that `recheck` gives it.
+struct Judged {
+    ontology: &'static str,
+    values: Value,
+    outcomes: Vec<Judgement>,
+}
+
+/// The actions of a campaign, judged by `recheck`.
+fn judged() -> &'static [Judged] {
+    static JUDGED: OnceLock<Vec<Judged>> = OnceLock::new();
+    JUDGED.get_or_init(|| {
+        let wanted = std::env::var(OUTCOMES).ok();
+        let wanted: usize = wanted.map_or(200, |wanted| wanted.parse().unwrap());
+        // A run has some fifty outcomes.
+        let runs = (wanted / 60 + 2).to_string();
+        let folder = project();
+        let config = "configs/pick_and_place.toml";
+        let ran = actcheck(
+            folder.path(),
+            &["run", config, "--runs", &runs, "--history", "h"],
+        );
+        assert!(
+            ran.status.code().is_some_and(|code| code < 2),
+            "{}",
+            stderr(&ran)
+        );
+        let history = History::open_existing(&folder.path().join("h")).unwrap();
+        let rows = history.runs(&RunFilter::default()).unwrap();
+        let traces: Vec<Trace> = rows
+            .iter()
+            .map(|row| history.traces().of(row, true).unwrap())
+            .collect();
+        let judged: Vec<Judged> = ONTOLOGIES
+            .iter()
+            .flat_map(|ontology| of_ontology(&history, &rows, &traces, ontology))
+            .collect();
+        let outcomes: usize = judged.iter().map(|action| action.outcomes.len()).sum();
+        assert!(outcomes >= wanted, "{outcomes}");
+        judged
+    })
+}
+
+fn of_ontology(
+    history: &History,
+    rows: &[RunRow],
+    traces: &[Trace],
+    ontology: &'static str,
+) -> Vec<Judged> {
+    let path = root().join("ontology").join(ontology);
+    let rules = RuleSet::prepare(&Files::Disk, &path).unwrap();
+    let stop = AtomicBool::new(false);
+    let (rechecks, faults) = judge_stored(history, rows, &rules, 2, &stop).unwrap();
+    assert!(faults.is_empty(), "{faults}");
+    let mut judged = Vec::new();
+    for (row, trace) in rows.iter().zip(traces) {
+        for (step, action) in trace.actions.iter().enumerate() {
+            // An action that was not performed has no states.
+            if !action.end.was_begun() {
+                continue;
+            }
+            let of_action = rechecks
+                .iter()
+                .filter(|it| it.run == row.run && it.step as usize == step + 1);
+            judged.push(Judged {
+                ontology,
+                values: judge_values::action(trace, step),
+                outcomes: of_action.map(|it| it.now.clone()).collect(),
+            });
+        }
+    }
+    judged
+}
+
+fn shipped(ontology: &str) -> String {
+    format!("built-in:ontology/{ontology}")
+}
+
+#[test]
+fn the_judge_gives_every_outcome_that_recheck_gives() {
+    let mut judge: Option<(&str, Judge)> = None;
+    for action in judged() {
+        let ready = judge.take().filter(|(of, _)| *of == action.ontology);
+        let (_, judge) = judge.insert(ready.unwrap_or_else(|| {
+            let path = shipped(action.ontology);
+            (
+                action.ontology,
+                Judge::new(Some(Path::new(&path)), &[]).unwrap(),
+            )
+        }));
+        let part = |name: &str| judge_values::plain(&action.values[name]);
+        let verdict = judge.judge(&Call {
+            action: action.values["action"].as_str().unwrap(),
+            before: &part("before"),
+            after: &part("after"),
+            during: &part("during"),
+            parameters: &part("parameters"),
+        });
+        let verdict = verdict.unwrap_or_else(|faults| panic!("{faults}"));
+        assert_eq!(verdict.judgements().len(), action.outcomes.len());
+        for (found, wanted) in verdict.judgements().iter().zip(&action.outcomes) {
+            assert!(found.same_as(wanted), "{found:?}\n{wanted:?}");
+        }
+    }
+}
+
+/// A copy of the package with the compiled rules. Returns `None` if they can't be compiled, which
+/// needs crates that only they use.
+fn package() -> Option<&'static Path> {
+    static PACKAGE: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    let package = PACKAGE.get_or_init(|| {
+        let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap();
+        let profile = if cfg!(debug_assertions) {
+            "dev"
+        } else {
+            "release"
+        };
+        // With all crates, so that those of the tests are reused.
+        foreign::run(
+            Command::new(env!("CARGO"))
+                .args(["build", "--offline", "--locked", "--workspace", "--lib"])
+                .args(["--features", "actcheck-judge/python", "--profile", profile])
+                .current_dir(root())
+                .env("CARGO_TARGET_DIR", target),
+        )?;
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("package_with_judge");
+        let package = folder.join("actcheck");
+        std::fs::create_dir_all(&package).map_err(|error| error.to_string())?;
+        for file in std::fs::read_dir(root().join("clients/python/src/actcheck")).unwrap() {
+            let file = file.unwrap();
+            if file.file_type().unwrap().is_file() {
+                std::fs::copy(file.path(), package.join(file.file_name())).unwrap();
+            }
+        }
+        let built = target.join(if cfg!(debug_assertions) {
+            "debug"
+        } else {
+            "release"
+        });
+        std::fs::copy(built.join("lib_judge.so"), package.join("_judge.abi3.so"))
+            .map_err(|error| error.to_string())?;
+        Ok(folder)
+    });
+    let package = package.as_ref();
+    package
+        .map_err(|why| foreign::left_out("the compiled rules for Python", why))
+        .ok()
+        .map(PathBuf::as_path)
+}
+
+/// Reads actions, one a line, and prints their judgements.
+const SCRIPT: &str = r#"
+import json, sys
+import actcheck, numpy
+
+def plain(value):
+    if isinstance(value, dict):
+        return {tuple(key.split("|")) if "|" in key else key: plain(it) for key, it in value.items()}
+    if isinstance(value, list):
+        numbers = value and all(type(it) in (int, float) for it in value)
+        return numpy.array(value, dtype=float) if numbers else [plain(it) for it in value]
+    return value
+
+judges = {}
+for line in open(sys.argv[1]):
+    action = plain(json.loads(line))
+    judge = judges.get(action["ontology"]) or judges.setdefault(action["ontology"], actcheck.Judge(action["ontology"]))
+    verdict = judge(action["action"], action["before"], action["after"], action["during"], action["parameters"])
+    print(json.dumps([[it.iri, it.outcome, it.margin, it.witness, it.held_before, it.vacuous, it.rule_digest]
+                      for it in verdict.values()]))
+"#;
+
+#[test]
+fn judge_in_python_gives_every_outcome_that_recheck_gives() {
+    let Some(package) = package() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let actions = folder.path().join("actions.jsonl");
+    let lines: Vec<String> = judged()
+        .iter()
+        .map(|action| {
+            let mut values = action.values.clone();
+            values["ontology"] = shipped(action.ontology).into();
+            values.to_string() + "\n"
+        })
+        .collect();
+    std::fs::write(&actions, lines.concat()).unwrap();
+    let output = Command::new(foreign::client_python())
+        .args(["-c", SCRIPT])
+        .arg(&actions)
+        .env("PYTHONPATH", package)
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    let text = stdout(&output);
+    let mut compared = 0;
+    for (line, action) in text.lines().zip(judged()) {
+        let found: Vec<Value> = serde_json::from_str(line).unwrap();
+        let wanted = action.outcomes.iter().map(|it| {
+            json!([
+                it.property,
+                it.outcome.word(),
+                it.margin,
+                it.witness,
+                it.held_before,
+                it.vacuous,
+                it.rule_digest,
+            ])
+        });
+        compared += found.len();
+        assert_eq!(
+            found,
+            wanted.collect::<Vec<Value>>(),
+            "{}",
+            action.values["action"]
+        );
+    }
+    let wanted: usize = judged().iter().map(|action| action.outcomes.len()).sum();
+    assert_eq!(compared, wanted);
+    eprintln!("{compared} outcomes are equal");
+    assert!(judged()[0].outcomes[0].property.starts_with(names::ACT));
+}
+
+#[test]
+fn the_tests_of_judge_pass_with_the_compiled_rules() {
+    let Some(package) = package() else { return };
+    let output = Command::new(foreign::client_python())
+        .args(["-W", "error", "-m", "unittest", "-v", "tests.test_judge"])
+        .current_dir(root().join("clients/python"))
+        .env("PYTHONPATH", package)
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .output()
+        .unwrap();
+    let text = stderr(&output);
+    assert!(
+        output.status.success() && !text.contains("skipped"),
+        "{text}"
+    );
+}
