@@ -18,35 +18,24 @@ mod embedded {
     #[folder = "shipped/models/"]
     #[prefix = "models/"]
     pub(super) struct Models;
-
-    /// The Python package, whose converters `actcheck import` starts.
-    #[derive(rust_embed::RustEmbed)]
-    #[folder = "shipped/python/"]
-    #[prefix = "clients/python/src/"]
-    #[include = "*.py"]
-    pub(super) struct Python;
 }
 
 /// Returns the bytes of an embedded file, by its path from the repository's root, or `None` if it
 /// does not exist.
 #[cfg(feature = "shipped")]
 pub(crate) fn read(key: &str) -> Option<Vec<u8>> {
-    use embedded::{Models, Ontology, Python, Rules};
+    use embedded::{Models, Ontology, Rules};
     let file = Ontology::get(key)
         .or_else(|| Rules::get(key))
-        .or_else(|| Models::get(key))
-        .or_else(|| Python::get(key))?;
+        .or_else(|| Models::get(key))?;
     Some(file.data.into_owned())
 }
 
 /// Returns the paths of all embedded files.
 #[cfg(feature = "shipped")]
 pub(crate) fn paths() -> Vec<PathBuf> {
-    use embedded::{Models, Ontology, Python, Rules};
-    let names = Ontology::iter()
-        .chain(Rules::iter())
-        .chain(Models::iter())
-        .chain(Python::iter());
+    use embedded::{Models, Ontology, Rules};
+    let names = Ontology::iter().chain(Rules::iter()).chain(Models::iter());
     names.map(|name| PathBuf::from(name.as_ref())).collect()
 }
 

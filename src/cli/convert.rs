@@ -9,10 +9,13 @@ use std::process::{Command, Stdio};
 
 use serde::Deserialize;
 
-use actcheck_base::{Diagnostic, Diagnostics, Files, ScratchFolder};
+use actcheck_base::{Diagnostic, Diagnostics, ScratchFolder};
 
-/// Folder of the Python package in the program.
-const PACKAGE: &str = "clients/python/src";
+/// The Python package, whose module `actcheck.episodes` converts episodes.
+#[derive(rust_embed::RustEmbed)]
+#[folder = "shipped/python/"]
+#[include = "*.py"]
+struct PythonPackage;
 
 /// Episode files, and the faults of files that could not be converted.
 pub struct Converted {
@@ -116,18 +119,16 @@ fn is_ours(path: &Path) -> bool {
 
 /// Writes the Python package into a folder.
 fn unpack(folder: &Path) -> Result<(), Diagnostics> {
-    for path in Files::all_shipped(Path::new(PACKAGE)) {
-        let Ok(below) = path.strip_prefix(PACKAGE) else {
+    for name in PythonPackage::iter() {
+        let Some(file) = PythonPackage::get(&name) else {
             continue;
         };
-        let target = folder.join("python").join(below);
-        let written = Files::Shipped.read_bytes(&path).map(|bytes| {
-            target
-                .parent()
-                .map_or(Ok(()), fs::create_dir_all)
-                .and_then(|()| fs::write(&target, bytes))
-        });
-        if !matches!(written, Ok(Ok(()))) {
+        let target = folder.join("python").join(&*name);
+        let written = target
+            .parent()
+            .map_or(Ok(()), fs::create_dir_all)
+            .and_then(|()| fs::write(&target, &file.data));
+        if written.is_err() {
             return Err(
                 Diagnostic::error("E008", format!("can't write {}", target.display()))
                     .help("free some space, or name another folder in TMPDIR")

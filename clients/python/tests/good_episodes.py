@@ -34,7 +34,7 @@ def perform(stage: Stage) -> None:
 
 
 def record(task: Task, state: int, path: Path) -> str:
-    """Records an episode. Returns what became of it."""
+    """Records an episode. Returns its result."""
     task.begin(state)
     for _ in range(SETTLING_STEPS):
         task.environment.step(idle(task.environment))

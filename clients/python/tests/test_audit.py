@@ -64,7 +64,7 @@ class Environment:
 
 
 def stated(goals: list[list[str]], start: str = "table_front_region") -> dict[str, str]:
-    """What the recorder states about a task."""
+    """The recorder's statements about a task."""
     with tempfile.TemporaryDirectory() as folder:
         environment = Environment(goals, start)
         with actcheck.record(environment, Path(folder) / "one.mcap") as recorder:

@@ -1,4 +1,4 @@
-"""Records the first states of a suite's tasks, and faulty episodes of them with what their own success function says."""
+"""Records the first states of a suite's tasks, and faulty episodes of them with the verdict of their own success function."""
 
 from __future__ import annotations
 

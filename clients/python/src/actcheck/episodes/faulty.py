@@ -1,4 +1,4 @@
-"""Faulty episodes: what happens in each, and whether it can happen in a scene."""
+"""Faulty episodes: the events in each, and whether they can happen in a scene."""
 
 from __future__ import annotations
 

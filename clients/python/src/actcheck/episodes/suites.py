@@ -75,7 +75,7 @@ def tasks(suite: str, numbers: list[int] | None) -> Iterator[tuple[int, Task]]:
 
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
-    """Moves what LIBERO and robosuite print to the standard error, and silences their warnings."""
+    """Moves the prints of LIBERO and robosuite to the standard error, and silences their warnings."""
     os.environ.setdefault("MUJOCO_GL", "disabled")
     disabled = logging.root.manager.disable
     logging.disable(logging.WARNING)

@@ -89,7 +89,7 @@ class _Episode:
         self.time = -1
         self._says_success = False
         self._has_reward = False
-        #: What the environment states about the task.
+        #: The environment's statements about the task.
         self.stated: dict[str, str] = {}
 
     def take(self, data: Any, reward: float | None, success: bool | None, terminated: bool, truncated: bool) -> None:
