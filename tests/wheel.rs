@@ -204,6 +204,14 @@ fn a_wheel_needs_no_checkout_and_no_rust() {
     assert!(mypy.status.success(), "{}", stdout(&mypy));
 
     if std::env::var_os(WHEEL).is_some() {
+        let judge = "import actcheck; print(*actcheck.Judge().actions)";
+        let mut python = Command::new(installed.bin().join("python"));
+        let judge = python
+            .args(["-c", judge])
+            .current_dir(folder)
+            .output()
+            .unwrap();
+        assert!(stdout(&judge).contains("Pick"), "{}", stderr(&judge));
         let name = installed.wheel.file_name().unwrap().to_string_lossy();
         assert!(name.contains("-py3-none-manylinux_2_28_"), "{name}");
         let size = std::fs::metadata(&installed.wheel).unwrap().len();
