@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 use super::{COARSEST, copy, edit, project_with, root, script, stderr};
 
 /// Commands for which exit code 1 is an answer: a failed property, a warning, a gap.
-const ANSWERS_WITH_1: [&str; 4] = ["run", "recheck", "health", "check-oracles"];
+const ANSWERS_WITH_1: [&str; 5] = ["run", "recheck", "health", "check-oracles", "import"];
 
 /// The folder; it is removed when this is dropped.
 pub struct Checkout {
@@ -28,6 +28,8 @@ impl Checkout {
         );
         std::fs::copy(root().join("Makefile"), folder.join("Makefile")).unwrap();
         copy(&root().join("clients"), &folder.join("clients"));
+        let episodes = "tests/data/episodes";
+        copy(&root().join(episodes), &folder.join(episodes));
         // The program as documents call it. The exit codes of its commands are recorded, and
         // queries without an answer.
         let program = env!("CARGO_BIN_EXE_actcheck");
