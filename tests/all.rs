@@ -52,6 +52,7 @@ mod kept_outcomes;
 mod kills;
 mod last_failed;
 mod launch;
+mod live_episodes;
 mod low_objects;
 mod many_pieces;
 mod many_runs;

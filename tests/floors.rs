@@ -71,7 +71,6 @@ const FENCES: [(&str, &[&str]); 33] = [
     ("hyper", &["serve"]),
     ("hyper-util", &["serve"]),
     ("tokio", &["serve"]),
-    ("pyo3", &["judge"]),
     ("spargebra", &["history", "rules"]),
     ("ureq", &["remote"]),
     ("rustls", &["remote"]),

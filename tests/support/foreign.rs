@@ -118,6 +118,30 @@ fn environment(name: &str, packages: &str) -> Result<PathBuf, String> {
     Ok(folder.join("bin/python"))
 }
 
+/// Python with MuJoCo, h5py and the folder of robosuite 1.4.0, cached beside the build output. Returns
+/// `None` if it can't be created.
+pub fn mujoco() -> Option<&'static Path> {
+    static PYTHON: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    let python = PYTHON.get_or_init(|| {
+        let python = environment("mujoco", "mujoco.txt")?;
+        let demonstrations =
+            "import importlib.util, sys; sys.exit(importlib.util.find_spec('robosuite') is None)";
+        if run(Command::new(&python).args(["-c", demonstrations])).is_err() {
+            let install = [
+                "-m",
+                "pip",
+                "install",
+                "--quiet",
+                "--no-deps",
+                "robosuite==1.4.0",
+            ];
+            run(Command::new(&python).args(install))?;
+        }
+        Ok(python)
+    });
+    made(python, "MuJoCo and robosuite from PyPI").map(PathBuf::as_path)
+}
+
 /// Allure's own generator from npm, as `tests/foreign/package.json` pins it, cached beside the
 /// build output. Returns `None` if it can't be installed.
 pub fn allure() -> Option<&'static Path> {

@@ -462,7 +462,6 @@ fn quantities(rule: &Rule) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::{Budget, Facts, RuleBook};
     use actcheck_base::{ActionFacts, Outcome, Source};
     use actcheck_ontology::{Ontology, Property, RuleFile};
