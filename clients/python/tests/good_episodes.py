@@ -13,12 +13,13 @@ import actcheck
 from actcheck.episodes.command import task_numbers
 from actcheck.episodes.faulty import Stage
 from actcheck.episodes.hand import NotPossible
+from actcheck.episodes.scene import Scene
 from actcheck.episodes.suites import Task, idle, quiet, tasks
 from actcheck.recording.file import slug
 
 #: Unit: metres.
 RISE = 0.15
-SETTLING_STEPS = 10
+SETTLING_STEPS, MOST_STEPS = 10, 150
 LAST_STEPS = 20
 
 
@@ -36,14 +37,17 @@ def perform(stage: Stage) -> None:
 def record(task: Task, state: int, path: Path) -> str:
     """Records an episode. Returns its result."""
     task.begin(state)
-    for _ in range(SETTLING_STEPS):
+    scene = Scene(task.environment)
+    for step in range(MOST_STEPS):
+        if step >= SETTLING_STEPS and scene.fastest() < 0.05:
+            break
         task.environment.step(idle(task.environment))
     aim = task.aim()
     if aim is None:
         return "another kind of goal"
     try:
         with actcheck.record(task.environment, path) as recorder:
-            stage = Stage(task.environment, aim, recorder)
+            stage = Stage(task.environment, aim, recorder, {})
             perform(stage)
     except NotPossible as reason:
         path.unlink()

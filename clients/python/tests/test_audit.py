@@ -108,18 +108,23 @@ class Scenes(unittest.TestCase):
         self.scene = Scene(Environment([]))
 
     def test_an_object_is_let_down_onto_a_place(self) -> None:
-        self.scene.let_down("cube_main", np.array([0.2, 0.2, 0.8]))
+        self.scene.let_down("cube_main", np.array([0.2, 0.2, 0.8]), self.scene.rotations()["cube_main"])
         np.testing.assert_allclose(self.scene.position("cube_main"), [0.2, 0.2, 0.85], atol=0.003)
         self.assertEqual(self.scene.touches("cube_main"), set())
 
     def test_an_object_is_turned_upside_down(self) -> None:
-        self.scene.let_down("can_main", np.array([0.2, 0.2, 0.8]), flipped=True, gap=0.1)
+        self.scene.let_down("can_main", np.array([0.2, 0.2, 0.8]), np.array([0.0, 1.0, 0.0, 0.0]), gap=0.1)
         np.testing.assert_allclose(self.scene.position("can_main"), [0.2, 0.2, 0.97], atol=0.003)
         np.testing.assert_allclose(self.scene.data.body("can_main").xmat[8], -1.0, atol=1e-9)
 
     def test_what_a_body_touches(self) -> None:
         self.scene.move("cube_main", np.array([0.0, 0.0, 0.829]))
         self.assertEqual(self.scene.touches("cube_main"), {"table"})
+
+    def test_the_fastest_body(self) -> None:
+        self.assertEqual(self.scene.fastest(), 0.0)
+        self.scene.push("can_main", np.array([0.3, 0.0, 0.4]))
+        self.assertAlmostEqual(self.scene.fastest(), 0.5)
 
     def test_other_movable_objects(self) -> None:
         self.assertEqual(self.scene.movable(), ["cube_main", "can_main"])

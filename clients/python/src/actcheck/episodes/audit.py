@@ -9,13 +9,19 @@ from typing import Any
 from actcheck.episodes.faults import EpisodeFault
 from actcheck.episodes.faulty import FAULTS, Stage
 from actcheck.episodes.hand import NotPossible
+from actcheck.episodes.scene import Scene
 from actcheck.episodes.suites import Aim, Task, idle, tasks
 from actcheck.recording import record
 from actcheck.recording.file import slug
+from actcheck.recording.states import Array
 
 #: A line of output.
 Line = dict[str, Any]
 
+#: What moves more slowly is at rest. Unit: m/s.
+_AT_REST_M_S = 0.05
+#: PickPlaceCan's unused objects fall from a height of 10 m.
+_MOST_STEPS_TO_REST = 150
 _OTHER_GOAL = "the task's goal isn't one object on or in a place"
 
 
@@ -51,25 +57,28 @@ def record_faults(suite: str, numbers: list[int] | None, faults: list[str], step
         for name in faults:
             line: Line = {"episode": f"{number}-{name}", "fault": name}
             task.begin(0)
+            # Before anything tips over.
+            upright = Scene(task.environment).rotations()
             _settle(task, settle)
+            _come_to_rest(task)
             aim = task.aim()
             if aim is None:
                 yield {"episode": f"{number}", "left_out": _OTHER_GOAL}
                 break
             path = _free(folder / f"{slug(task.name)}-{name}.mcap")
             try:
-                yield line | {"written": str(path), "their_success": _record(task, aim, name, steps, path)}
+                yield line | {"written": str(path), "their_success": _record(task, aim, name, upright, steps, path)}
             except NotPossible as reason:
                 path.unlink()
                 yield line | {"left_out": str(reason)}
 
 
-def _record(task: Task, aim: Aim, name: str, steps: int, path: Path) -> bool:
+def _record(task: Task, aim: Aim, name: str, upright: dict[str, Array], steps: int, path: Path) -> bool:
     """Records a faulty episode. Returns whether the environment counted it as a success."""
     fault = FAULTS[name]
     with record(task.environment, path) as recorder:
         recorder.about |= {"fault": name, "note.fault": fault.sentence}
-        stage = Stage(task.environment, aim, recorder)
+        stage = Stage(task.environment, aim, recorder, upright)
         fault.happen(stage)
         stage.wait(steps)
     return stage.success
@@ -77,6 +86,15 @@ def _record(task: Task, aim: Aim, name: str, steps: int, path: Path) -> bool:
 
 def _settle(task: Task, steps: int) -> None:
     for _ in range(steps):
+        task.environment.step(idle(task.environment))
+
+
+def _come_to_rest(task: Task) -> None:
+    """The robot does nothing until nothing else moves: a fault begins in a state at rest, where there is one."""
+    scene = Scene(task.environment)
+    for _ in range(_MOST_STEPS_TO_REST):
+        if scene.fastest() < _AT_REST_M_S:
+            return
         task.environment.step(idle(task.environment))
 
 

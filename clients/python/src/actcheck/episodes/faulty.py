@@ -29,8 +29,9 @@ _PICKED_M = 0.25
 class Stage:
     """An episode while it is recorded and made faulty."""
 
-    def __init__(self, environment: Any, aim: Aim, recorder: Recorder) -> None:
-        self.aim, self.scene = aim, Scene(environment)
+    def __init__(self, environment: Any, aim: Aim, recorder: Recorder, upright: dict[str, Array]) -> None:
+        """`upright`: rotations of the movable bodies, w, x, y, z."""
+        self.aim, self.scene, self._upright = aim, Scene(environment), upright
         self.environment, self._recorder = environment, recorder
         self._check: Callable[[], Any] = judge_of_success(environment)._check_success
         self._last = idle(environment)
@@ -60,7 +61,9 @@ class Stage:
     def put(self, body: str, flipped: bool = False, gap: float = 0.0) -> None:
         """Puts a body at the goal, as no robot does."""
         if self.aim.carries:
-            self.scene.let_down(body, self.aim.point, flipped, gap)
+            w, x, y, z = self._upright[body]
+            rotation = np.array([-x, w, -z, y] if flipped else [w, x, y, z])
+            self.scene.let_down(body, self.aim.point, rotation, gap)
         else:
             self.scene.move(body, self.aim.point)
 

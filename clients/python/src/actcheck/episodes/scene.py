@@ -37,6 +37,11 @@ class Scene:
         joints = self.model.jnt_type == self._mujoco.mjtJoint.mjJNT_FREE
         return [str(self.model.body(int(body)).name) for body in self.model.jnt_bodyid[joints]]
 
+    def fastest(self) -> float:
+        """Speed of the fastest movable body. Unit: m/s."""
+        speeds = [float(np.linalg.norm(self.data.qvel[at : at + 3])) for at in map(self._velocity, self.movable())]
+        return max(speeds, default=0.0)
+
     def others(self, body: str, target: str) -> list[str]:
         """The movable bodies in the scene other than two, from the nearest to the first one to the farthest."""
         at = self.position(body)
@@ -57,16 +62,17 @@ class Scene:
 
     def push(self, body: str, velocity: Array) -> None:
         """Gives a movable body a velocity without rotation. Unit: m/s. Frame: world."""
-        at = int(self.model.jnt_dofadr[self._joint(body)])
+        at = self._velocity(body)
         self.data.qvel[at : at + 6] = [*velocity, 0.0, 0.0, 0.0]
         self._mujoco.mj_forward(self.model, self.data)
 
-    def let_down(self, body: str, point: Array, flipped: bool = False, gap: float = 0.0) -> None:
+    def rotations(self) -> dict[str, Array]:
+        """The rotations of the movable bodies: w, x, y, z."""
+        return {body: self._pose(body)[3:].copy() for body in self.movable()}
+
+    def let_down(self, body: str, point: Array, rotation: Array, gap: float = 0.0) -> None:
         """Puts a movable body above a point, `gap` metres above the height where it first touches something."""
-        pose = self._pose(body)
-        w, x, y, z = pose[3:]
-        rotation = np.array([-x, w, -z, y] if flipped else [w, x, y, z])
-        # Half a turn moves a body's shapes to the other side of its origin: its middle is to be above the point.
+        # A rotation moves a body's shapes about its origin: its middle is to be above the point.
         self.move(body, point, rotation)
         beside = self.middle(body) - self.position(body)
         highest = np.array([point[0] - beside[0], point[1] - beside[1], point[2] + _ABOVE_M])
@@ -116,6 +122,10 @@ class Scene:
 
     def _joint(self, body: str) -> int:
         return int(self.model.body(body).jntadr[0])
+
+    def _velocity(self, body: str) -> int:
+        """Index of a movable body's velocity in the generalised velocities."""
+        return int(self.model.jnt_dofadr[self._joint(body)])
 
     def _pose(self, body: str) -> Array:
         at = int(self.model.jnt_qposadr[self._joint(body)])
