@@ -147,7 +147,7 @@ mod tests {
         }
         for wrong in ["", "0", "-1MB", "inf", "NaN", "much", "10 apples"] {
             assert!(
-                memory(wrong).is_err_and(|message| message.contains("GiB")),
+                memory(wrong).is_err_and(|message| message.to_string().contains("GiB")),
                 "{wrong}"
             );
         }
@@ -178,7 +178,7 @@ mod tests {
         ] {
             assert!(
                 duration(wrong)
-                    .is_err_and(|message| message.contains("10m") || message.contains("zero")),
+                    .is_err_and(|message| message.to_string().contains("10m") || message.to_string().contains("zero")),
                 "{wrong}"
             );
         }

@@ -185,7 +185,7 @@ mod tests {
             ("reported = 2", "true or false"),
         ] {
             let told = Condition::parse(wrong).expect_err(wrong);
-            assert!(told.contains(reason), "{wrong}: {told}");
+            assert!(told.to_string().contains(reason), "{wrong}: {told}");
         }
     }
 }
