@@ -177,8 +177,8 @@ mod tests {
             "10 apples",
         ] {
             assert!(
-                duration(wrong)
-                    .is_err_and(|message| message.to_string().contains("10m") || message.to_string().contains("zero")),
+                duration(wrong).is_err_and(|message| message.to_string().contains("10m")
+                    || message.to_string().contains("zero")),
                 "{wrong}"
             );
         }

@@ -122,21 +122,37 @@ pub(super) fn prepare(
     text: &Source,
     cancel: &Cancel,
 ) -> Result<Prepared, Diagnostics> {
-    let syntax = |error: SparqlSyntaxError| syntax_fault(text, &error.to_string());
     // Places in the text that is evaluated differ from the original's, so errors are reported
     // before.
-    drop(evaluator(cancel).parse_query(&*text.text).map_err(syntax)?);
+    let parsed = evaluator(cancel).parse_query(&*text.text);
+    drop(parsed.map_err(|error| unparsed(text, &error))?);
     let counted = if text.text.contains("counts") {
         history.counted_runs()?
     } else {
         BTreeSet::new()
     };
+    prepare_counting(counted, text, cancel)
+}
+
+/// Parses a query whose syntax is valid. `counted`: ids of the runs that count in rates.
+///
+/// # Errors
+/// Syntax errors.
+pub(super) fn prepare_counting(
+    counted: BTreeSet<String>,
+    text: &Source,
+    cancel: &Cancel,
+) -> Result<Prepared, Diagnostics> {
     let made = Arc::new(AtomicUsize::new(0));
     let evaluator = with_counts(evaluator(cancel), counted);
     let prepared = with_text_functions(evaluator, cancel, &made)
         .parse_query(&bounded_texts(&text.text))
-        .map_err(syntax)?;
+        .map_err(|error| unparsed(text, &error))?;
     Ok(Prepared { prepared, made })
+}
+
+fn unparsed(text: &Source, error: &SparqlSyntaxError) -> Diagnostic {
+    syntax_fault(text, &error.to_string())
 }
 
 /// Adds functions that make texts of limited length: the evaluator keeps them until the query ends.

@@ -6,6 +6,7 @@ pub mod expected;
 pub mod exported;
 pub mod foreign;
 pub mod judge_values;
+pub mod left_out;
 pub mod line;
 pub mod look;
 pub mod made_up;

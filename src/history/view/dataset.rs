@@ -492,6 +492,8 @@ mod tests {
         "SELECT * { ?s ?p ?o BIND(xsd:double(?o) AS ?n) OPTIONAL { ?x ?q ?n } }",
         "SELECT * { ?s ?p ?o BIND(?o / 0 AS ?n) OPTIONAL { ?x ?q ?n } }",
         "SELECT * { ?s ?p ?o BIND(CONCAT(STR(?o), '') AS ?t) ?x ?q ?t }",
+        "SELECT * { ?s ?p ?o BIND(STRAFTER(STR(?o), 'a') AS ?t) FILTER(?t) }",
+        "SELECT * { ?s ?p ?o BIND(?o - 1 AS ?n) FILTER(?n) }",
         "SELECT * { ?s ?p ?o BIND(IRI(STR(?o)) AS ?i) ?i ?q ?x }",
         "SELECT * { ?s ?p ?o BIND(?o - 'PT1H'^^xsd:dayTimeDuration AS ?t) FILTER(BOUND(?t)) }",
         "SELECT DISTINCT ?o { { ?s ?p ?o } UNION { GRAPH ?g { ?s ?p ?o } } }",

@@ -4,6 +4,8 @@ mod dataset;
 mod demand;
 mod interner;
 mod orders;
+#[cfg(test)]
+mod w3c_tests;
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
