@@ -75,11 +75,11 @@ def _parser() -> argparse.ArgumentParser:
     convert.add_argument("--timestep", type=_positive, metavar="SECONDS", help="time between states in a file that does not say")
     states = commands.add_parser("states", help="record the first states of a suite's tasks, for `actcheck check-episodes`")
     states.add_argument("--states", type=int, default=10, metavar="N", help="initial states of a task; seeds of robosuite [default: 10]")
-    faulty = commands.add_parser("audit", help="record faulty episodes of a suite's tasks from the first state at rest, for `actcheck check-oracles --episodes`")
+    faulty = commands.add_parser("audit", help="record faulty episodes of a suite's tasks, for `actcheck check-oracles --episodes`")
     faulty.add_argument("--faults", type=fault_names, default=list(FAULTS), metavar="A,B", help=f"some of {', '.join(FAULTS)} [default: all]")
     faulty.add_argument("--steps", type=int, default=40, metavar="N", help="steps after the fault in which the robot does nothing [default: 40]")
     for command in (states, faulty):
-        command.add_argument("suite", metavar="SUITE", help="a suite of LIBERO, such as libero_spatial, or robosuite/ with the name of an environment")
+        command.add_argument("suite", metavar="SUITE", help="a suite of LIBERO, such as libero_spatial, or robosuite/NAME")
         command.add_argument("--tasks", type=task_numbers, metavar="0,3-5", help="numbers of tasks [default: all]")
         command.add_argument("--settle", type=int, default=10, metavar="N", help="idle steps before the first state [default: 10]")
     for command in (convert, states, faulty):
