@@ -9,8 +9,8 @@ use rayon::prelude::*;
 use crate::workers::workers;
 use crate::{Ending, RuleSet};
 use actcheck_base::{
-    ActionFacts, Diagnostic, Diagnostics, Judgement, Outcome, did_you_mean, digest_of, names,
-    program_digest,
+    ActionFacts, Diagnostic, Diagnostics, Judgement, Outcome, RunFacts, did_you_mean, digest_of,
+    names, program_digest,
 };
 use actcheck_data::{Role, Trace};
 use actcheck_episodes::{Episode, Mapping, trace};
@@ -260,16 +260,8 @@ pub struct CheckedPremises {
     pub premises: Vec<(String, Outcome, String)>,
 }
 
-/// Judges the premises of an episode's actions over its first state.
-///
-/// # Errors
-/// The episode can't be read or mapped.
-pub fn check_premises(
-    rules: &RuleSet,
-    file: &EpisodeFile<'_>,
-) -> Result<CheckedPremises, Diagnostics> {
-    let Read { trace, about, .. } = read(rules, file)?;
-    let facts = facts::extract(&trace);
+/// Returns the premises of a trace's actions, over its first state: each with its outcome and words.
+fn premises_of(rules: &RuleSet, trace: &Trace, facts: &RunFacts) -> Vec<(String, Outcome, String)> {
     let mut premises = Vec::new();
     for (step, performed) in trace.actions.iter().enumerate() {
         let action = &rules.actions[&performed.action];
@@ -291,6 +283,19 @@ pub fn check_premises(
             });
         }
     }
+    premises
+}
+
+/// Judges the premises of an episode's actions over its first state.
+///
+/// # Errors
+/// The episode can't be read or mapped.
+pub fn check_premises(
+    rules: &RuleSet,
+    file: &EpisodeFile<'_>,
+) -> Result<CheckedPremises, Diagnostics> {
+    let Read { trace, about, .. } = read(rules, file)?;
+    let premises = premises_of(rules, &trace, &facts::extract(&trace));
     Ok(CheckedPremises {
         task: task_of(&about),
         file: file.named.clone(),
@@ -321,6 +326,8 @@ pub struct AuditedEpisode {
     pub counted: Option<bool>,
     /// Local names of the failed properties, each with its words.
     pub failed: Vec<(String, String)>,
+    /// The premise that does not hold, with its words: the scene is not the task's.
+    pub broken_premise: Option<(String, String)>,
     /// Number of passed and failed outcomes.
     pub decided: usize,
     /// Why nothing was decided: the words of the first property.
@@ -349,7 +356,12 @@ pub fn audit_episode(
         });
     let is_decided =
         |judgement: &&&Judgement| matches!(judgement.outcome, Outcome::Passed | Outcome::Failed);
+    let broken_premise = premises_of(rules, &run.trace, &run.facts)
+        .into_iter()
+        .find(|(_, outcome, _)| *outcome == Outcome::Failed)
+        .map(|(premise, _, words)| (premise, words));
     Ok(AuditedEpisode {
+        broken_premise,
         fault: about.get("fault").cloned().unwrap_or_default(),
         task: task_of(&about),
         file: file.named.clone(),

@@ -44,7 +44,7 @@ pub(super) fn audit(asked: &Audit<'_>) -> Result<u8, Diagnostics> {
     output::print(&printed(&audited, asked.format));
     let missed = audited
         .iter()
-        .any(|episode| !episode.fault.is_empty() && episode.failed.is_empty());
+        .any(|episode| !episode.fault.is_empty() && !is_noticed(episode));
     if faults.is_empty() {
         return Ok(u8::from(missed));
     }
@@ -59,6 +59,11 @@ fn made_or_found(episodes: &str, python: &Path) -> Result<Converted, Diagnostics
         return convert::episodes(&found(&[path])?, python, None);
     }
     convert::faulty_episodes(episodes, python)
+}
+
+/// Whether a property failed, or the scene is not the one that the task is about.
+fn is_noticed(episode: &AuditedEpisode) -> bool {
+    !episode.failed.is_empty() || episode.broken_premise.is_some()
 }
 
 fn printed(audited: &[AuditedEpisode], format: Format) -> String {
@@ -77,13 +82,14 @@ fn printed(audited: &[AuditedEpisode], format: Format) -> String {
                 .failed
                 .first()
                 .cloned()
+                .or_else(|| episode.broken_premise.clone())
                 .unwrap_or_else(|| (String::new(), episode.undecided.clone()));
             table.rows.push(vec![
                 json!(episode.task),
                 json!(episode.fault),
                 json!(episode.file),
                 json!(episode.counted),
-                json!(!episode.failed.is_empty()),
+                json!(is_noticed(episode)),
                 json!(property),
                 json!(words),
             ]);
@@ -99,6 +105,7 @@ fn printed(audited: &[AuditedEpisode], format: Format) -> String {
         "episodes",
         "their check counts as success",
         "the properties notice",
+        "by a broken premise",
         "undecided",
         "by",
     ]);
@@ -126,8 +133,11 @@ fn printed(audited: &[AuditedEpisode], format: Format) -> String {
             } else {
                 json!(null)
             },
-            json!(count(&|episode| !episode.failed.is_empty())),
-            json!(count(&|episode| episode.decided == 0)),
+            json!(count(&is_noticed)),
+            json!(count(&|episode| episode.broken_premise.is_some())),
+            json!(count(
+                &|episode| episode.decided == 0 && episode.broken_premise.is_none()
+            )),
             json!(by.join(", ")),
         ]);
     }

@@ -4,9 +4,10 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
+use crate::cast::Thing;
 use crate::mapping::{Action, Moment};
 use crate::snapshot::Watched;
-use crate::{Episode, Mark};
+use crate::{Episode, Mark, State};
 
 /// A shorter interruption does not end a hold: contact with a finger may be lost for some states.
 /// Unit: seconds.
@@ -159,7 +160,7 @@ impl<'w> Holds<'w> {
         };
         match moment {
             Moment::Start => Some(0),
-            Moment::Settled => Some(settled(self.watched)),
+            Moment::Settled => Some(settled(self.watched, action)),
             Moment::End => Some(states.len().saturating_sub(1)),
             Moment::Grasp => Some(hold()?.first),
             Moment::Top => Some(hold()?.highest),
@@ -175,20 +176,36 @@ impl<'w> Holds<'w> {
     }
 }
 
-/// Returns the first of the first states in which no movable thing moves, or 0.
-fn settled(watched: &Watched<'_>) -> usize {
+/// Returns the first of the first states in which the things of an action are at rest and stay so
+/// until the next state, or 0. An action without things waits for all that can move.
+///
+/// A stored state may have no velocities although its things are in the air.
+fn settled(watched: &Watched<'_>, action: &Action) -> usize {
     let states = &watched.episode.states;
     let begins = states.first().map_or(0.0, |state| state.time_secs);
-    let movable = || watched.cast.things.iter().filter(|thing| !thing.fixed);
+    let things = &watched.cast.things;
+    let named: Vec<usize> = action
+        .parameters
+        .values()
+        .flatten()
+        .filter_map(|id| watched.cast.thing(id))
+        .collect();
+    let waited: Vec<&Thing> = (0..things.len())
+        .filter(|idx| named.is_empty() || named.contains(idx))
+        .map(|idx| &things[idx])
+        .filter(|thing| !thing.fixed)
+        .collect();
+    let rests = |thing: &Thing, state: &State, next: &State| {
+        let place = |state: &State| thing.pose(&state.poses).translation.vector;
+        let way = (place(next) - place(state)).norm();
+        let secs = (next.time_secs - state.time_secs).max(f64::MIN_POSITIVE);
+        let [linear, _] = watched.velocities(thing, state);
+        Vector3::from(linear).norm() < AT_REST_M_S && way / secs < AT_REST_M_S
+    };
     states
-        .iter()
-        .take_while(|state| state.time_secs - begins <= SETTLING_SECS)
-        .position(|state| {
-            movable().all(|thing| {
-                let [linear, _] = watched.velocities(thing, state);
-                Vector3::from(linear).norm() < AT_REST_M_S
-            })
-        })
+        .windows(2)
+        .take_while(|pair| pair[0].time_secs - begins <= SETTLING_SECS)
+        .position(|pair| waited.iter().all(|thing| rests(thing, &pair[0], &pair[1])))
         .unwrap_or(0)
 }
 

@@ -77,7 +77,8 @@ pub struct Action {
 pub enum Moment {
     /// The first state.
     Start,
-    /// The first state in which all movable things are at rest; the first state if there is none.
+    /// The first state in which the things of the action are at rest; the first state if there is
+    /// none.
     Settled,
     /// The last state.
     End,
