@@ -11,9 +11,10 @@ use crate::support::expected::assert_expected;
 use crate::support::{actcheck, edit, root, script, stderr, stdout};
 
 /// Pages with commands. Each has a test, so that they run side by side.
-const WITH_COMMANDS: [&str; 10] = [
+const WITH_COMMANDS: [&str; 11] = [
     "bisect.md",
     "cookbook.md",
+    "episodes.md",
     "failures.md",
     "history.md",
     "launch.md",
@@ -62,6 +63,11 @@ fn commands_of_the_page_about_bisection_work() {
 #[test]
 fn commands_of_the_cookbook_work() {
     commands_work("cookbook.md");
+}
+
+#[test]
+fn commands_of_the_page_about_episodes_work() {
+    commands_work("episodes.md");
 }
 
 #[test]

@@ -860,7 +860,7 @@ fn a_history_of_another_format_is_not_changed() {
     let (folder, history) = filled();
     drop(history);
     let dir = folder.path().join("history");
-    for (version, help) in [("6", "update actcheck"), ("4", "no release wrote")] {
+    for (version, help) in [("7", "update actcheck"), ("5", "no release wrote")] {
         std::fs::write(dir.join("VERSION"), format!("actcheck history {version}\n")).unwrap();
         for fault in [code(History::open(&dir)), code(History::open_to_read(&dir))] {
             assert!(
@@ -871,7 +871,7 @@ fn a_history_of_another_format_is_not_changed() {
             );
         }
     }
-    std::fs::write(dir.join("VERSION"), "actcheck history 5\n").unwrap();
+    std::fs::write(dir.join("VERSION"), "actcheck history 6\n").unwrap();
     assert_eq!(
         History::open_existing(&dir)
             .unwrap()

@@ -2,14 +2,14 @@
 //! user's choice.
 
 use std::ffi::OsStr;
-use std::fs::{self, File};
+use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use serde::Deserialize;
 
-use actcheck_base::{Diagnostic, Diagnostics, ScratchFolder};
+use actcheck_base::{Diagnostic, Diagnostics, ScratchFolder, open_regular};
 
 /// The Python package, whose module `actcheck.episodes` converts episodes.
 #[derive(rust_embed::RustEmbed)]
@@ -108,7 +108,7 @@ pub fn episodes(
 /// damaged at their beginning are read, so that the fault is reported.
 fn is_ours(path: &Path) -> bool {
     let mut start = [0u8; 64];
-    let read = File::open(path).and_then(|mut file| file.read(&mut start));
+    let read = open_regular(path).and_then(|mut file| file.read(&mut start));
     let Ok(length) = read else {
         return path.is_file();
     };

@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use clap::Args;
 
+use crate::option_fault::OptionFault;
 use crate::options::{ProofFormat, duration, memory};
 use crate::{explanations, output};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Source};
@@ -57,7 +58,7 @@ pub struct DatalogArgs {
 }
 
 /// Parses the name and value of a parameter.
-fn parameter(text: &str) -> Result<(String, String), String> {
+fn parameter(text: &str) -> Result<(String, String), OptionFault> {
     let (name, value) = text
         .split_once('=')
         .ok_or("write the name, `=` and the value, such as `limit=1`")?;

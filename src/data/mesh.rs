@@ -238,7 +238,8 @@ mod tests {
         assert!(
             Mesh::new(corner.to_vec(), vec![[0, 1, 4]])
                 .expect_err("the index is out of range")
-                .to_string().contains("triangle 1")
+                .to_string()
+                .contains("triangle 1")
         );
     }
 }

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
-use actcheck_base::{Diagnostic, Digest};
+use actcheck_base::{Diagnostic, Digest, open_regular};
 use actcheck_data::{Part, Pose, Shape as Geometry};
 use mcap::parse_record;
 use mcap::records::Record;
@@ -80,11 +80,7 @@ impl Records {
             Diagnostic::error("E001", format!("can't read {shown}: {error}"))
                 .help("give files that `actcheck.record` or `actcheck import` wrote")
         };
-        let file = File::open(path).map_err(unreadable)?;
-        if !file.metadata().map_err(unreadable)?.is_file() {
-            return Err(Diagnostic::error("E001", format!("{shown} is not a file"))
-                .help("give the files of episodes, or a folder of them"));
-        }
+        let file = open_regular(path).map_err(unreadable)?;
         Ok(Self {
             file,
             digest: Digest::new(),

@@ -18,7 +18,7 @@ from actcheck.recording.states import Array
 #: A line of output.
 Line = dict[str, Any]
 
-#: What moves more slowly is at rest. Unit: m/s.
+#: Bodies that move more slowly are at rest. Unit: m/s.
 _AT_REST_M_S = 0.05
 #: PickPlaceCan's unused objects fall from a height of 10 m.
 _MOST_STEPS_TO_REST = 150
