@@ -508,7 +508,7 @@ fn check_skills(campaign: &Campaign, ontology: &Ontology, faults: &mut Diagnosti
 }
 
 /// E020: checks that a campaign was simulated here.
-fn can_be_simulated(record: &CampaignRecord) -> Result<(), Diagnostic> {
+fn can_be_simulated(record: &CampaignRecord) -> Result<(), Diagnostics> {
     match &record.imported_from {
         None => Ok(()),
         Some(engine) => Err(Diagnostic::error(
@@ -518,6 +518,7 @@ fn can_be_simulated(record: &CampaignRecord) -> Result<(), Diagnostic> {
                 record.id
             ),
         )
-        .help("run it again in its own simulator; `actcheck report` replays its recorded motion")),
+        .help("run it again in its own simulator; `actcheck report` replays its recorded motion")
+        .into()),
     }
 }

@@ -263,8 +263,8 @@ pub(super) fn mapped<'m>(
         } else {
             match Episode::environment(&episode.path) {
                 Ok(environment) => environment,
-                Err(fault) => {
-                    faults.push(fault);
+                Err(found) => {
+                    faults.extend(found);
                     continue;
                 }
             }

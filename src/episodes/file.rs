@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
-use actcheck_base::{Diagnostic, Digest, open_regular};
+use actcheck_base::{Diagnostic, Diagnostics, Digest, open_regular};
 use actcheck_data::{Part, Pose, Shape as Geometry};
 use mcap::parse_record;
 use mcap::records::Record;
@@ -35,7 +35,7 @@ impl Episode {
     /// # Errors
     /// E001 if the file can't be read, E002 if it is not an episode file or damaged, E003 if a
     /// value is impossible, and E004 if it is too large.
-    pub fn read(path: &Path) -> Result<(Self, String), Diagnostic> {
+    pub fn read(path: &Path) -> Result<(Self, String), Diagnostics> {
         let mut records = Records::open(path)?;
         let read = Reader::default().read(&mut records);
         let episode = read.map_err(|fault| fault.of_file(path))?;
@@ -46,7 +46,7 @@ impl Episode {
     ///
     /// # Errors
     /// As [`Episode::read`].
-    pub fn environment(path: &Path) -> Result<String, Diagnostic> {
+    pub fn environment(path: &Path) -> Result<String, Diagnostics> {
         let mut records = Records::open(path)?;
         let mut environment = None;
         let read = records.each(|record| {
@@ -74,13 +74,13 @@ struct Records {
 }
 
 impl Records {
-    fn open(path: &Path) -> Result<Self, Diagnostic> {
+    fn open(path: &Path) -> Result<Self, Diagnostics> {
         let shown = path.display();
         let unreadable = |error: std::io::Error| {
             Diagnostic::error("E001", format!("can't read {shown}: {error}"))
                 .help("give files that `actcheck.record` or `actcheck import` wrote")
         };
-        let file = open_regular(path).map_err(unreadable)?;
+        let file = open_regular(path).map_err(|error| Diagnostics::from(unreadable(error)))?;
         Ok(Self {
             file,
             digest: Digest::new(),
@@ -133,9 +133,11 @@ enum FileFault {
 }
 
 impl FileFault {
-    fn of_file(&self, path: &Path) -> Diagnostic {
+    fn of_file(&self, path: &Path) -> Diagnostics {
         let (code, message, help) = self.words();
-        Diagnostic::error(code, format!("{}: {message}", path.display())).help(help)
+        Diagnostic::error(code, format!("{}: {message}", path.display()))
+            .help(help)
+            .into()
     }
 
     fn words(&self) -> (&'static str, String, &'static str) {
@@ -522,7 +524,8 @@ fn pose(name: &str, position: [f64; 3], rotation: [f64; 4]) -> Result<Pose, File
     let [x, y, z, w] = rotation;
     let turn = Quaternion::new(w, x, y, z);
     let is_position = |value: &f64| value.is_finite() && value.abs() <= LARGEST_VALUE;
-    if !position.iter().all(is_position) || !((turn.norm() - 1.0).abs() <= UNIT_TOLERANCE) {
+    let is_unit = (turn.norm() - 1.0).abs() <= UNIT_TOLERANCE;
+    if !is_unit || !position.iter().all(is_position) {
         return Err(FileFault::Value(format!(
             "the pose of `{name}` is impossible: position {position:?}, quaternion {rotation:?}"
         )));
