@@ -42,7 +42,8 @@ fn main() {
             let facts = extract(trace);
             let (action, budget) = (&ontology.actions["Pick"], Budget::default());
             let end = &trace.actions[0].end;
-            let judged = judge_action(&ontology, &rules, action, end, facts.action(0), &budget);
+            let seen = (facts.start(), facts.action(0));
+            let judged = judge_action(&ontology, &rules, action, end, seen, &budget);
             black_box(judged).expect("nothing interrupts it");
         }
     };

@@ -237,7 +237,7 @@ fn changed(run: &RunRecord, campaign: &str, index: u64, rate: f64) -> RunRecord 
         .scene
         .objects
         .iter()
-        .any(|object| object.model.name == "glass" && object.friction < 0.3);
+        .any(|object| object.model == "glass" && object.friction < 0.3);
     let mut other = Dice(digest_of(campaign, index));
     for judgement in run.judgements.iter_mut().flatten() {
         let rate = if slips { 3.0 * rate } else { rate };

@@ -64,7 +64,7 @@ fn with(value: Value, keys: &[&str], new: Value) -> Value {
 }
 
 fn judge() -> Judge {
-    Judge::new(None, &[]).unwrap()
+    Judge::new(None, &[]).expect("it is valid")
 }
 
 fn parameters() -> Value {
@@ -102,7 +102,7 @@ fn faults(before: &Value, after: &Value, during: &Value, parameters: &Value) -> 
         during,
         parameters,
     };
-    judge().judge(&call).unwrap_err().to_string()
+    judge().judge(&call).expect_err("it is refused").to_string()
 }
 
 #[test]
@@ -157,8 +157,8 @@ fn quantities_that_are_not_given_are_missing_and_named() {
             during: &Value::Null,
             parameters: &parameters,
         })
-        .unwrap();
-    let missing = |property: &str| verdict.missing(property).unwrap();
+        .expect("it is valid");
+    let missing = |property: &str| verdict.missing(property).expect("it is valid");
     assert_eq!(missing("ObjectGrasped"), ["message", "reported"]);
     assert!(missing("ObjectInGripper").contains(&"leftTouches"));
     assert_eq!(missing("MovedObject"), [] as [&str; 0]);
@@ -187,19 +187,22 @@ fn a_verdict_is_explained() {
             during: &Value::Null,
             parameters: &parameters,
         })
-        .unwrap();
+        .expect("it is valid");
     assert_eq!(verdict.judgements()[3].outcome, Outcome::Failed);
     assert!(!verdict.passed());
-    let why = verdict.why("MovedObject").unwrap();
+    let why = verdict.why("MovedObject").expect("it is valid");
     assert!(
         why.contains("is only 1 cm off table, needs more than 2 cm"),
         "{why}"
     );
     let why_not = verdict
         .why_not("MovedObject", "near_its_place(obj:table)")
-        .unwrap();
+        .expect("it is valid");
     assert!(why_not.contains("is not derived"), "{why_not}");
-    let unknown = verdict.why("MovedObjekt").unwrap_err().to_string();
+    let unknown = verdict
+        .why("MovedObjekt")
+        .expect_err("it is refused")
+        .to_string();
     assert!(
         unknown.contains("J012") && unknown.contains("did you mean `MovedObject`"),
         "{unknown}"
@@ -245,7 +248,10 @@ fn every_fault_is_reported_with_its_place() {
         found.contains("J008") && found.contains("`cube`, `table`"),
         "{found}"
     );
-    let named = judge().properties("Pik").unwrap_err().to_string();
+    let named = judge()
+        .properties("Pik")
+        .expect_err("it is refused")
+        .to_string();
     assert!(
         named.contains("J005") && named.contains("did you mean `Pick`"),
         "{named}"
@@ -262,7 +268,7 @@ fn own_rules_judge_any_action_alone_or_besides_others() {
         text: RULE.to_owned(),
     };
     let (before, after) = (state(0.0, false), state(0.2, true));
-    let own = Judge::new(None, &[rule("StaysUpright")]).unwrap();
+    let own = Judge::new(None, &[rule("StaysUpright")]).expect("it is valid");
     let parameters = parameters();
     let verdict = own.judge(&Call {
         action: "Lift",
@@ -271,18 +277,18 @@ fn own_rules_judge_any_action_alone_or_besides_others() {
         during: &Value::Null,
         parameters: &parameters,
     });
-    let verdict = verdict.unwrap();
+    let verdict = verdict.expect("it is valid");
     assert_eq!(verdict.judgements().len(), 1);
     assert!(verdict.passed());
     let path = std::path::Path::new("built-in:ontology/actions.ttl");
-    let both = Judge::new(Some(path), &[rule("StaysUpright")]).unwrap();
-    assert_eq!(both.properties("Pick").unwrap().len(), 6);
+    let both = Judge::new(Some(path), &[rule("StaysUpright")]).expect("it is valid");
+    assert_eq!(both.properties("Pick").expect("it is valid").len(), 6);
     for (name, part) in [
         ("MovedObject", "another property"),
         ("is good", "can't be the name"),
     ] {
         let found = Judge::new(Some(path), &[rule(name)])
-            .unwrap_err()
+            .expect_err("it is refused")
             .to_string();
         assert!(found.contains("J009") && found.contains(part), "{found}");
     }
@@ -290,7 +296,9 @@ fn own_rules_judge_any_action_alone_or_besides_others() {
         name: "Wrong".to_owned(),
         text: "success(?x) :- aftr(?x, w:z, 1.0) .".to_owned(),
     };
-    let found = Judge::new(None, &[wrong]).unwrap_err().to_string();
+    let found = Judge::new(None, &[wrong])
+        .expect_err("it is refused")
+        .to_string();
     assert!(found.contains("Wrong.rls:1:"), "{found}");
 }
 
@@ -353,16 +361,16 @@ fn a_monitor_judges_every_step() {
             success(?o) :- parameter(act:pickObject, ?o), once(w:z(?o) > 0.95) ."
             .to_owned(),
     };
-    let judge = Judge::new(None, &[rule]).unwrap();
+    let judge = Judge::new(None, &[rule]).expect("it is valid");
     let mut monitor = judge
         .monitor("Pick", &state(0.0, false), &parameters())
-        .unwrap();
+        .expect("it is valid");
     let outcomes: Vec<Outcome> = (1..=4)
         .map(|step| {
             let height = [0.0, 0.1, 0.2, 0.1, 0.0][step];
             let verdict = monitor
                 .step(&state(height, true), step as f64 * 0.05, None)
-                .unwrap();
+                .expect("it is valid");
             verdict.judgements()[0].outcome
         })
         .collect();
@@ -370,7 +378,7 @@ fn a_monitor_judges_every_step() {
     assert_eq!(outcomes, [Failed, Passed, Passed, Passed]);
     let late = monitor
         .step(&state(0.0, true), 1.0, None)
-        .unwrap_err()
+        .expect_err("it is refused")
         .to_string();
     assert!(late.contains("J010"), "{late}");
 }
