@@ -16,6 +16,9 @@ const INTERRUPTION_SECS: f64 = 0.1;
 const SETTLING_SECS: f64 = 3.0;
 /// Things that move more slowly are at rest. Unit: m/s.
 const AT_REST_M_S: f64 = 0.05;
+/// A thing that is farther away in the next state did not begin to fall: it was put elsewhere. Unit:
+/// metres. A fall of this length takes 0.1 s.
+const JUMP_M: f64 = 0.05;
 
 /// One action in an episode.
 #[derive(Debug, Clone, PartialEq)]
@@ -179,7 +182,8 @@ impl<'w> Holds<'w> {
 /// Returns the first of the first states in which the things of an action are at rest and stay so
 /// until the next state, or 0. An action without things waits for all that can move.
 ///
-/// A stored state may have no velocities although its things are in the air.
+/// A stored state may have no velocities although its things are in the air. A thing that is put
+/// elsewhere was at rest before.
 fn settled(watched: &Watched<'_>, action: &Action) -> usize {
     let states = &watched.episode.states;
     let begins = states.first().map_or(0.0, |state| state.time_secs);
@@ -200,7 +204,8 @@ fn settled(watched: &Watched<'_>, action: &Action) -> usize {
         let way = (place(next) - place(state)).norm();
         let secs = (next.time_secs - state.time_secs).max(f64::MIN_POSITIVE);
         let [linear, _] = watched.velocities(thing, state);
-        Vector3::from(linear).norm() < AT_REST_M_S && way / secs < AT_REST_M_S
+        let stays = way / secs < AT_REST_M_S || way > JUMP_M;
+        Vector3::from(linear).norm() < AT_REST_M_S && stays
     };
     states
         .windows(2)
