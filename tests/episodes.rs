@@ -281,6 +281,36 @@ fn an_episode_has_the_same_trace_each_time() {
     assert!(trace.lacks.contains(&"restitution".to_owned()));
 }
 
+/// Each action begins in the state in which the one before it ended, also if the mapping leaves a gap
+/// between them or lets them overlap.
+#[test]
+fn actions_have_no_gaps() {
+    let text = fs::read_to_string(data("made.toml")).unwrap();
+    let (episode, _) = Episode::read(&data("good-000001.mcap")).unwrap();
+    let [first, last] =
+        [episode.states.first(), episode.states.last()].map(|s| s.unwrap().time_secs);
+    for second_begins in [0.2, 0.6, 0.8] {
+        let actions = format!(
+            "\n[[actions]]\naction = \"Pick\"\nfrom = \"start\"\nto = 0.6\npickObject = \"cube\"\n\
+             \n[[actions]]\naction = \"Pick\"\nfrom = {second_begins:?}\nto = \"end\"\npickObject = \"cube\"\n"
+        );
+        let mapping = Mapping::parse(&Source::new("made.toml", text.clone() + &actions)).unwrap();
+        let cast = mapping.cast(&episode).unwrap();
+        let trace = trace(&episode, &cast, &mapping.actions_of(&episode).unwrap());
+        assert_eq!(trace.snapshots.len(), 3, "{second_begins}");
+        let secs: Vec<f64> = trace
+            .actions
+            .iter()
+            .map(|action| action.duration_secs)
+            .collect();
+        assert!((secs[0] - 0.6).abs() < 0.051, "{secs:?}");
+        assert!(
+            (secs.iter().sum::<f64>() - (last - first)).abs() < 1e-9,
+            "{secs:?}"
+        );
+    }
+}
+
 /// Every fault of a mapping and of a file is reported with its code, and nothing is stored.
 #[test]
 fn faults_are_reported_and_store_nothing() {

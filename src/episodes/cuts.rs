@@ -35,11 +35,27 @@ pub struct Span {
 
 /// Returns the actions of an episode: those that the mapping lists, or else those that the recording
 /// program marked.
+///
+/// Each begins where the one before it ended, because the state after an action is the state before
+/// the next one: what happens between two actions belongs to the later one.
 pub(crate) fn spans(watched: &Watched<'_>, actions: &[Action]) -> Vec<Span> {
-    let episode = watched.episode;
-    if actions.is_empty() {
-        return marked(episode);
+    let mut spans = if actions.is_empty() {
+        marked(watched.episode)
+    } else {
+        listed(watched, actions)
+    };
+    let mut ended = None;
+    for [from, to] in spans.iter_mut().filter_map(|span| span.states.as_mut()) {
+        *from = ended.unwrap_or(*from);
+        *to = (*to).max(*from);
+        ended = Some(*to);
     }
+    spans
+}
+
+/// Returns the actions that the mapping lists.
+fn listed(watched: &Watched<'_>, actions: &[Action]) -> Vec<Span> {
+    let episode = watched.episode;
     let holds = Holds::new(watched, actions);
     let mut spans = Vec::new();
     let mut earliest = Some(0);
@@ -89,8 +105,9 @@ fn marked(episode: &Episode) -> Vec<Span> {
     let mut spans: Vec<Span> = Vec::new();
     let mut open: Option<&Mark> = None;
     let last = episode.states.len().saturating_sub(1);
-    let mut close = |begin: &Mark, end: Option<&Mark>| {
-        let to = end.map_or(last, |end| index(end.time_secs));
+    let mut close = |begin: &Mark, next: Option<&Mark>| {
+        let to = next.map_or(last, |next| index(next.time_secs));
+        let end = next.filter(|next| !next.begins && next.action == begin.action);
         spans.push(Span {
             action: begin.action.clone(),
             parameters: begin
@@ -104,8 +121,7 @@ fn marked(episode: &Episode) -> Vec<Span> {
     };
     for mark in &episode.marks {
         if let Some(begin) = open.take() {
-            let ends = !mark.begins && mark.action == begin.action;
-            close(begin, ends.then_some(mark));
+            close(begin, Some(mark));
         }
         if mark.begins {
             open = Some(mark);

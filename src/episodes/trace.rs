@@ -40,7 +40,6 @@ pub fn trace(episode: &Episode, cast: &Cast, actions: &[Action]) -> Trace {
         lacks: lacks(&watched, &spans).facts(),
         ..Trace::default()
     };
-    let mut lists_states_of = None;
     for span in &spans {
         let Some([from, to]) = span.states else {
             trace
@@ -48,14 +47,13 @@ pub fn trace(episode: &Episode, cast: &Cast, actions: &[Action]) -> Trace {
                 .push(ActionTrace::not_reached(&span.action, &span.parameters));
             continue;
         };
-        // The state after one action is the state before the next.
-        if lists_states_of.is_none() {
+        // The state after one action is the state before the next one.
+        if trace.snapshots.is_empty() {
             trace
                 .snapshots
                 .push(watched.snapshot(&episode.states[from]));
         }
         trace.snapshots.push(watched.snapshot(&episode.states[to]));
-        lists_states_of = Some(to);
         let (action, course) = performed(&watched, span, [from, to]);
         trace.actions.push(action);
         trace.robot_courses.push(course);
