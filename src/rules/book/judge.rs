@@ -131,6 +131,9 @@ impl RuleBook {
         budget: &Budget,
         fails_consequents: bool,
     ) -> BTreeMap<String, Result<Findings, RuleFault>> {
+        if properties.is_empty() {
+            return BTreeMap::new();
+        }
         let mut universe = Universe::of_action(&self.terms, facts);
         let derived = match self.enriched(facts, &mut universe, budget) {
             Ok(derived) => derived,
@@ -222,7 +225,7 @@ impl RuleBook {
     /// still holds passed vacuously: no `a` held where it matters, so that no `b` was asked for.
     ///
     /// Only right sides count that make the property harder to pass.
-    /// [`RuleBook::can_pass_vacuously`] names them properties have one.
+    /// [`RuleBook::can_pass_vacuously`] tells which properties have one.
     pub fn without_consequents(
         &self,
         facts: &ActionFacts<'_>,

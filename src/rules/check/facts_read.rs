@@ -5,14 +5,15 @@
 //! *unsound*. Tuples of a sound predicate are certain, and so is their absence from a complete one.
 //!
 //! A missing fact is named by its property (`w:tilt`), by the thing that all facts are missing about
-//! (`w:gripper`), or by a quantity over time: `w:samples/z` if no thing has it,
-//! `w:samples/each/z` if some thing lacks it, `w:samples` if there is no course at all.
+//! (`w:gripper`), or by a quantity over time. `w:samples/z` means that no thing has the quantity `z`,
+//! `w:samples/each/z` that at least one thing lacks it, and `w:samples` that no quantity was recorded
+//! over time.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::model::expression::Expr;
 use crate::model::program::{
-    CheckedProgram, Literal, Operand, PredicateId, Predicates, Rule, Scope,
+    CheckedProgram, Literal, Operand, PredicateId, Predicates, Rule, RulesByHead, Scope,
 };
 use crate::temporal::quantities_read;
 use actcheck_base::{Findings, Terms, names};
@@ -27,6 +28,8 @@ const MOST_NAMED: usize = 3;
 #[derive(Debug, Clone, Default)]
 pub(crate) struct FactsRead {
     rules: Vec<ReadRule>,
+    /// Predicates with facts that the rule files state: they have tuples in any case.
+    stated: BTreeSet<PredicateId>,
     /// Facts by their predicates: the names under which they can be missing; empty for facts of any
     /// property.
     given: BTreeMap<PredicateId, Vec<String>>,
@@ -164,15 +167,12 @@ impl FactsRead {
             .iter()
             .filter(|(predicate, property)| is_missing(property) && !derived.contains(predicate))
             .map(|(predicate, _)| *predicate)
+            .filter(|predicate| !self.stated.contains(predicate))
             .collect();
         loop {
             let derives = |rule: &&ReadRule| !rule.positive.iter().any(|it| empty.contains(it));
-            let filled: BTreeSet<PredicateId> = self
-                .rules
-                .iter()
-                .filter(derives)
-                .map(|rule| rule.head)
-                .collect();
+            let heads = self.rules.iter().filter(derives).map(|rule| rule.head);
+            let filled: BTreeSet<PredicateId> = heads.chain(self.stated.iter().copied()).collect();
             let more: Vec<PredicateId> = derived
                 .iter()
                 .copied()
@@ -287,7 +287,9 @@ fn undecided(missing: &[&str]) -> Findings {
 
 /// The rules that may derive each predicate of the libraries.
 pub(crate) struct Derivations<'a> {
-    rules: BTreeMap<PredicateId, Vec<&'a Rule>>,
+    rules: RulesByHead<'a>,
+    /// Predicates of the facts that the rule files state.
+    stated: BTreeSet<PredicateId>,
     predicates: &'a Predicates,
     terms: &'a Terms,
 }
@@ -299,7 +301,8 @@ impl<'a> Derivations<'a> {
         terms: &'a Terms,
     ) -> Self {
         let mut derivations = Self {
-            rules: BTreeMap::new(),
+            rules: RulesByHead::default(),
+            stated: BTreeSet::new(),
             predicates,
             terms,
         };
@@ -308,18 +311,15 @@ impl<'a> Derivations<'a> {
     }
 
     fn add(&mut self, program: &'a CheckedProgram) {
-        for rule in &program.rules {
-            self.rules
-                .entry(rule.head.predicate)
-                .or_default()
-                .push(rule);
-        }
+        self.rules.add(program);
+        self.stated.extend(program.facts.keys());
     }
 
     /// Returns the facts that a property in Datalog reads.
     pub(crate) fn of_program(&self, program: &'a CheckedProgram, scope: Scope) -> FactsRead {
         let mut own = Self {
             rules: self.rules.clone(),
+            stated: self.stated.clone(),
             ..*self
         };
         own.add(program);
@@ -398,7 +398,10 @@ impl<'a> Derivations<'a> {
                 }
                 read.given.insert(id, known);
             }
-            for rule in self.rules.get(&id).into_iter().flatten() {
+            if self.stated.contains(&id) {
+                read.stated.insert(id);
+            }
+            for rule in self.rules.of(id) {
                 open.extend(rule.reads().filter(|read| seen.insert(*read)));
                 read.quantities.extend(quantities(rule));
                 read.rules.push(ReadRule::of(rule, self.terms));
@@ -537,6 +540,17 @@ mod tests {
                 "dry(?x) :- after(?x, :wet, false), ~soaked(?x) . soaked(?x) :- after(?x, :wet, true) .
                  good(?x) :- dry(?x) . good(?x) :- after(?x, :full, true) . success(?x) :- good(?x) .",
                 Passed,
+            ),
+            // The rule file states what it could also derive.
+            (
+                "wettest(:lake) . wettest(?x) :- after(?x, :wet, true) .
+                 success(?x) :- after(?x, :on, :table), ~dirty(?x) . dirty(?x) :- after(?x, :on, :floor), ~wettest(?x) .",
+                Passed,
+            ),
+            (
+                "listed(:cup) . listed(?x) :- after(?x, :wet, true) .
+                 known(?x) :- listed(?x), ~soaked(?x) . soaked(?x) :- after(?x, :wet, true) . success(?x) :- known(?x) .",
+                Inapplicable,
             ),
             // Whether it applies is known, or not.
             (

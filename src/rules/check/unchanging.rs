@@ -6,11 +6,11 @@
 //! the action, may depend on the robot, so that only rules that never read one are reported. A
 //! precondition or a premise is supposed to read the state before the action.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use crate::model::given::Phases;
 use crate::model::program::{
-    Atom, CheckedProgram, Literal, Operand, PredicateId, Predicates, Rule, Scope,
+    Atom, CheckedProgram, Literal, Operand, PredicateId, Predicates, Rule, RulesByHead, Scope,
 };
 use actcheck_base::{CONSTANT_PROPERTIES, Diagnostic, Source, Span, TermId, Terms, names};
 use actcheck_ontology::{Ontology, Property};
@@ -50,7 +50,7 @@ pub(crate) fn warning(
 
 /// The rules that may derive each predicate, and the facts that they read.
 pub(crate) struct Reads<'a> {
-    rules: BTreeMap<PredicateId, Vec<&'a Rule>>,
+    rules: RulesByHead<'a>,
     predicates: &'a Predicates,
     phases: Phases,
     /// Ids of the constant properties.
@@ -68,12 +68,12 @@ impl<'a> Reads<'a> {
         terms: &Terms,
     ) -> Self {
         let mut reads = Self {
-            rules: BTreeMap::new(),
+            rules: RulesByHead::default(),
             predicates,
             phases,
             constant: BTreeSet::new(),
         };
-        reads.add(library);
+        reads.rules.add(library);
         let is_constant = |iri: &str| {
             iri.strip_prefix(names::W)
                 .is_some_and(|local| CONSTANT_PROPERTIES.contains(&local))
@@ -90,15 +90,6 @@ impl<'a> Reads<'a> {
         reads
     }
 
-    fn add(&mut self, program: &'a CheckedProgram) {
-        for rule in &program.rules {
-            self.rules
-                .entry(rule.head.predicate)
-                .or_default()
-                .push(rule);
-        }
-    }
-
     /// The first rule of a property's verdict, if no rule of it reads a fact that an action can
     /// change.
     pub(crate) fn unchanging(
@@ -106,7 +97,7 @@ impl<'a> Reads<'a> {
         program: &'a CheckedProgram,
         scope: Scope,
     ) -> Option<&'a Rule> {
-        self.add(program);
+        self.rules.add(program);
         let verdict = ["success", "violation", "applicable"];
         let verdict: Vec<PredicateId> = verdict
             .into_iter()
@@ -115,7 +106,7 @@ impl<'a> Reads<'a> {
         let mut seen = BTreeSet::new();
         let mut rules = verdict
             .iter()
-            .flat_map(|predicate| self.rules.get(predicate).into_iter().flatten());
+            .flat_map(|predicate| self.rules.of(*predicate));
         if rules.any(|rule| self.rule_changes(rule, false, &mut seen)) {
             return None;
         }
@@ -172,16 +163,11 @@ impl<'a> Reads<'a> {
         if !seen.insert((atom.predicate, is_before)) {
             return false;
         }
-        let reads_before = |rule: &&&Rule| match rule.head.args.first() {
+        let reads_before = |rule: &&Rule| match rule.head.args.first() {
             Some(Operand::Constant(phase)) if is_state => *phase == self.phases.before,
             _ => true,
         };
-        let mut rules = self
-            .rules
-            .get(&atom.predicate)
-            .into_iter()
-            .flatten()
-            .filter(reads_before);
+        let mut rules = self.rules.of(atom.predicate).filter(reads_before);
         rules.any(|rule| self.rule_changes(rule, is_before, seen))
     }
 }

@@ -276,3 +276,19 @@ pub(crate) struct CheckedProgram {
     /// Facts from the text or from imported files, as rows stored one after another.
     pub(crate) facts: BTreeMap<PredicateId, Vec<TermId>>,
 }
+
+/// The rules that may derive each predicate.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct RulesByHead<'a>(BTreeMap<PredicateId, Vec<&'a Rule>>);
+
+impl<'a> RulesByHead<'a> {
+    pub(crate) fn add(&mut self, program: &'a CheckedProgram) {
+        for rule in &program.rules {
+            self.0.entry(rule.head.predicate).or_default().push(rule);
+        }
+    }
+
+    pub(crate) fn of(&self, head: PredicateId) -> impl Iterator<Item = &'a Rule> {
+        self.0.get(&head).into_iter().flatten().copied()
+    }
+}
