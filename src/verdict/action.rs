@@ -79,29 +79,23 @@ fn uninterrupted(found: Found) -> Result<Found, Interrupted> {
     }
 }
 
-/// Sets `held_before` on the passed judgements whose property states success.
+/// Sets `held_before` on the passed judgements whose property states success. It stays unset if the
+/// state before the action could not be judged.
 fn note_held_before(
     rules: &RuleBook,
     facts: &ActionFacts<'_>,
     judgements: &mut [Judgement],
     budget: &Budget,
 ) -> Result<(), Interrupted> {
-    let asked: Vec<String> = judgements
-        .iter()
-        .filter(|judgement| {
-            judgement.outcome == Outcome::Passed && rules.states_success(&judgement.property)
-        })
-        .map(|judgement| judgement.property.clone())
-        .collect();
+    let asked = passed(judgements, |property| rules.states_success(property));
     if asked.is_empty() {
         return Ok(());
     }
     let before = uninterrupted(rules.held_before(facts, &asked, budget))?;
     for judgement in judgements {
-        // `held_before` stays unset if the state before the action could not be judged.
-        if let Some(Ok(found)) = before.get(&judgement.property) {
-            judgement.held_before = Some(found.applicable && found.holds);
-        }
+        judgement.held_before = judgement
+            .held_before
+            .or(holds(&before, &judgement.property));
     }
     Ok(())
 }
@@ -113,21 +107,28 @@ fn note_vacuous(
     judgements: &mut [Judgement],
     budget: &Budget,
 ) -> Result<(), Interrupted> {
-    let asked: Vec<String> = judgements
-        .iter()
-        .filter(|judgement| {
-            judgement.outcome == Outcome::Passed && rules.can_pass_vacuously(&judgement.property)
-        })
-        .map(|judgement| judgement.property.clone())
-        .collect();
+    let asked = passed(judgements, |property| rules.can_pass_vacuously(property));
     if asked.is_empty() {
         return Ok(());
     }
     let found = uninterrupted(rules.without_consequents(facts, &asked, budget))?;
     for judgement in judgements {
-        if let Some(Ok(found)) = found.get(&judgement.property) {
-            judgement.vacuous = Some(found.applicable && found.holds);
-        }
+        judgement.vacuous = judgement.vacuous.or(holds(&found, &judgement.property));
     }
     Ok(())
+}
+
+/// The passed properties of a kind.
+fn passed(judgements: &[Judgement], is_of_kind: impl Fn(&str) -> bool) -> Vec<String> {
+    judgements
+        .iter()
+        .filter(|judgement| judgement.outcome == Outcome::Passed && is_of_kind(&judgement.property))
+        .map(|judgement| judgement.property.clone())
+        .collect()
+}
+
+/// Whether a property applies and holds; `None` if it was not judged.
+fn holds(found: &Found, property: &str) -> Option<bool> {
+    let found = found.get(property)?.as_ref().ok()?;
+    Some(found.applicable && found.holds)
 }
