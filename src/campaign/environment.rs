@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::budget::runs_per_test;
 use crate::case::check_case;
 use crate::requirement::Requirement;
+use crate::rule_set::recorded_rules;
 use crate::solids;
 use actcheck_actions as actions;
 use actcheck_base::{Diagnostic, Diagnostics, Source, program_digest};
@@ -243,18 +244,6 @@ impl Env {
 
     /// The campaign's record for the history.
     pub fn record(&self, id: String, name: String, started: String) -> CampaignRecord {
-        let rules = self
-            .ontology
-            .properties
-            .values()
-            .map(|p| {
-                (
-                    p.iri.clone(),
-                    p.rule.path.clone(),
-                    self.rules.digest(&p.iri).to_owned(),
-                )
-            })
-            .collect();
         let mut models: Vec<(String, String)> = self
             .campaign
             .models
@@ -282,7 +271,7 @@ impl Env {
                 Path::new(&*self.campaign.source.name),
             ),
             ontology_digest: self.ontology.digest.clone(),
-            rules,
+            rules: recorded_rules(&self.ontology, &self.rules),
             findings,
             models,
             skill: self.skill(),

@@ -10,6 +10,8 @@ mod case;
 mod changes;
 mod difference;
 mod environment;
+mod episode;
+mod episode_checks;
 mod export;
 mod failure;
 mod finished_run;
@@ -44,12 +46,11 @@ pub use budget::ExhaustedBudget;
 pub use changes::{ChangeKind, InputChange, changes, made_by_other_physics, other_physics};
 pub use difference::TraceDifference;
 pub use environment::Env;
+pub use episode::EpisodeFile;
+pub use episode_checks::{AuditedEpisode, CheckedPremises, audit_episode, check_premises};
 pub use export::{export, regressions_folder};
 pub use failure::Failure;
-pub use import::{
-    AuditedEpisode, CheckedPremises, EpisodeFile, ImportEnd, ImportOptions, audit_episode,
-    check_premises, import, name_of_import,
-};
+pub use import::{ImportEnd, ImportOptions, ImportedCampaign, import, name_of_import};
 pub use last_failed::LastFailed;
 pub use line::{Clock, Disturbance, RunContext, RunInput, run_line, run_sabotaged};
 pub use outcome::{CampaignResult, Ending, WeightedRate};

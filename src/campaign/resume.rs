@@ -69,7 +69,10 @@ pub fn unfinished(
         };
     }
     for row in history.campaigns()?.iter().rev() {
-        if is_finished(row) || row.name.starts_with(SHRUNK) || row.name.starts_with(FAILED_AGAIN) {
+        let is_made_otherwise = row.name.starts_with(SHRUNK)
+            || row.name.starts_with(FAILED_AGAIN)
+            || row.imported_from.is_some();
+        if is_finished(row) || is_made_otherwise {
             continue;
         }
         let record = history.campaign(&row.id)?;

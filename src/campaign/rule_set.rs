@@ -37,6 +37,11 @@ impl RuleSet {
         self.rules.warnings()
     }
 
+    /// The rules as a campaign's record lists them.
+    pub(super) fn recorded(&self) -> Vec<(String, String, String)> {
+        recorded_rules(&self.ontology, &self.rules)
+    }
+
     /// Whether a rule reads quantities over time.
     pub fn reads_course(&self) -> bool {
         self.rules.reads_course()
@@ -95,4 +100,23 @@ impl RuleSet {
         only.rules = only.rules.restricted(&ontology)?;
         Ok(only)
     }
+}
+
+/// Returns the rules as a campaign's record lists them: each property's IRI, its rule file, and the
+/// digest of its rule.
+pub(super) fn recorded_rules(
+    ontology: &Ontology,
+    rules: &RuleBook,
+) -> Vec<(String, String, String)> {
+    ontology
+        .properties
+        .values()
+        .map(|property| {
+            (
+                property.iri.clone(),
+                property.rule.path.clone(),
+                rules.digest(&property.iri).to_owned(),
+            )
+        })
+        .collect()
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use crate::convert::{self, Converted};
-use crate::import::{Mappings, first_of, found, mapped, rules_for};
+use crate::import::{Mappings, first_of_episodes, found};
 use crate::options::Format;
 use crate::output;
 use actcheck_base::Diagnostics;
@@ -26,29 +26,31 @@ pub(super) struct Audit<'a> {
 /// Judges faulty episodes and prints, for each fault, how many the environment's check counts as
 /// successes and how many the properties notice. Returns the exit code.
 pub(super) fn audit(asked: &Audit<'_>) -> Result<u8, Diagnostics> {
-    let mappings = Mappings::load(asked.mapping)?;
+    let mappings = Mappings::load(asked.mapping, None)?;
     let mut faults = Diagnostics::new();
     let mut audited: Vec<AuditedEpisode> = Vec::new();
+    let mut left_out = Vec::new();
     for episodes in asked.episodes {
         let converted = made_or_found(episodes, asked.python)?;
-        let (files, more) = mapped(&converted, &mappings)?;
+        let (files, more) = mappings.choose(&converted);
         faults.extend(more);
-        let rules = rules_for(None, asked.mapping, &files)?;
+        left_out.extend(converted.left_out.clone());
         for file in &files {
-            match audit_episode(&rules, file) {
+            match audit_episode(file) {
                 Ok(episode) => audited.push(episode),
                 Err(found) => faults.extend(found),
             }
         }
     }
     output::print(&printed(&audited, asked.format));
+    output::tell(&left_out, asked.format != Format::Text);
     let missed = audited
         .iter()
         .any(|episode| !episode.fault.is_empty() && !is_noticed(episode));
     if faults.is_empty() {
         return Ok(u8::from(missed));
     }
-    output::print_diagnostics(&first_of(faults));
+    output::print_diagnostics(&first_of_episodes(faults));
     Ok(2)
 }
 

@@ -7,7 +7,7 @@ use clap::Args;
 use serde_json::json;
 
 use crate::convert;
-use crate::import::{Mappings, first_of, found, mapped, rules_for};
+use crate::import::{Mappings, first_of_episodes, found};
 use crate::options::Format;
 use crate::output;
 use actcheck_base::{Diagnostics, Outcome};
@@ -39,12 +39,11 @@ pub struct CheckEpisodesArgs {
 pub fn check_episodes(args: &CheckEpisodesArgs) -> Result<u8, Diagnostics> {
     let files = found(&args.files)?;
     let converted = convert::episodes(&files, &args.python, None)?;
-    let mappings = Mappings::load(args.mapping.as_deref())?;
-    let (files, mut faults) = mapped(&converted, &mappings)?;
-    let rules = rules_for(args.ontology.as_deref(), args.mapping.as_deref(), &files)?;
+    let mappings = Mappings::load(args.mapping.as_deref(), args.ontology.as_deref())?;
+    let (files, mut faults) = mappings.choose(&converted);
     let mut tasks: BTreeMap<String, Vec<CheckedPremises>> = BTreeMap::new();
     for file in &files {
-        match check_premises(&rules, file) {
+        match check_premises(file) {
             Ok(checked) => tasks.entry(checked.task.clone()).or_default().push(checked),
             Err(found) => faults.extend(found),
         }
@@ -74,7 +73,7 @@ pub fn check_episodes(args: &CheckEpisodesArgs) -> Result<u8, Diagnostics> {
     if faults.is_empty() {
         return Ok(u8::from(any));
     }
-    output::print_diagnostics(&first_of(faults));
+    output::print_diagnostics(&first_of_episodes(faults));
     Ok(2)
 }
 

@@ -34,7 +34,12 @@ pub struct CheckOraclesArgs {
     #[arg(long, value_name = "FILE", requires = "episodes")]
     pub mapping: Option<PathBuf>,
     /// The Python of that simulator
-    #[arg(long, value_name = "PROGRAM", default_value = "python3")]
+    #[arg(
+        long,
+        value_name = "PROGRAM",
+        default_value = "python3",
+        requires = "episodes"
+    )]
     pub python: PathBuf,
     /// Scenes for each test, instead of the configuration's `test_count`; each runs once without a
     /// fault and once with each fault

@@ -18,11 +18,15 @@ use actcheck_base::{Diagnostic, Diagnostics, ScratchFolder, open_regular};
 struct PythonPackage;
 
 /// Episode files, and the faults of files that could not be converted.
+#[derive(Default)]
 pub struct Converted {
     /// In the order of the files and of the episodes in them.
     pub episodes: Vec<ConvertedEpisode>,
     /// Faults of the others.
     pub faults: Diagnostics,
+    /// Sentences about faulty episodes that could not be made, such as a dropped object that the
+    /// scripted hand could not pick up.
+    pub left_out: Vec<String>,
     /// Removed when it is dropped.
     _scratch: Option<ScratchFolder>,
 }
@@ -46,7 +50,7 @@ struct Line {
     #[serde(default)]
     reason: Option<String>,
     #[serde(default)]
-    help: Option<String>,
+    left_out: Option<String>,
 }
 
 /// Whether a file's name has the ending of an episode.
@@ -70,11 +74,7 @@ pub fn episodes(
     python: &Path,
     quaternions: Option<&str>,
 ) -> Result<Converted, Diagnostics> {
-    let mut converted = Converted {
-        episodes: Vec::new(),
-        faults: Diagnostics::new(),
-        _scratch: None,
-    };
+    let mut converted = Converted::default();
     let others: Vec<&PathBuf> = files.iter().filter(|path| !is_ours(path)).collect();
     let scratch = if others.is_empty() {
         None
@@ -145,11 +145,7 @@ fn unpack(folder: &Path) -> Result<(), Diagnostics> {
 /// E008 if the Python can't be started.
 pub fn faulty_episodes(suite: &str, python: &Path) -> Result<Converted, Diagnostics> {
     let scratch = new_scratch()?;
-    let mut converted = Converted {
-        episodes: Vec::new(),
-        faults: Diagnostics::new(),
-        _scratch: None,
-    };
+    let mut converted = Converted::default();
     let into = scratch.path().join("episodes");
     let arguments = [
         "audit".as_ref(),
@@ -246,28 +242,31 @@ fn run(
                 Some(key) if !key.is_empty() => format!("{}:{key}", line.file),
                 _ => line.file.clone(),
             };
-            match (line.written, line.reason) {
-                (Some(written), _) => converted.episodes.push(ConvertedEpisode {
-                    path: written,
-                    named,
-                }),
-                (None, reason) => {
-                    let reason = reason.unwrap_or_else(|| "it can't be converted".to_owned());
-                    let fault = Diagnostic::error("E009", format!("{named}: {reason}"));
-                    converted.faults.push(match line.help {
-                        Some(help) => fault.help(help),
-                        None => fault,
-                    });
-                }
+            if let Some(path) = line.written {
+                converted.episodes.push(ConvertedEpisode { path, named });
+            } else if let Some(reason) = line.left_out {
+                let sentence = format!("{named} is left out: {reason}");
+                converted.left_out.push(sentence);
+            } else {
+                let reason = line.reason.unwrap_or("it can't be converted".to_owned());
+                let fault = Diagnostic::error("E009", format!("{named}: {reason}"));
+                converted.faults.push(fault);
             }
         }
     }
     let status = child.wait().map_err(not_started)?;
     let errors = errors.join().unwrap_or_default();
-    if !any {
+    // The converter ends with 0, or with 1 if it printed a fault.
+    let is_crashed = !matches!(status.code(), Some(0 | 1));
+    if !any || is_crashed {
+        let what = if any {
+            format!("some episodes of {shown} are missing")
+        } else {
+            format!("{shown} can't be converted")
+        };
         let last = errors.lines().last().unwrap_or("it printed nothing");
         converted.faults.push(
-            Diagnostic::error("E009", format!("{shown} can't be converted: {last}")).help(format!(
+            Diagnostic::error("E009", format!("{what}: {last}")).help(format!(
                 "the converter `{} -m actcheck.episodes` ended with {status}",
                 python.display()
             )),

@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::Args;
-use serde_json::json;
+use serde_json::{Value, json};
 
-use crate::convert::{self, Converted};
+use crate::convert::{self, Converted, ConvertedEpisode};
 use crate::options::Format;
 use crate::progress::Progress;
 use crate::why::ontology_file;
@@ -15,7 +16,8 @@ use crate::work::all_cores;
 use crate::{clock, output, stop};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Outcome, Source, names};
 use actcheck_campaign::{
-    Ending, EpisodeFile, ImportEnd, ImportOptions, RuleSet, import as import_all, name_of_import,
+    Ending, EpisodeFile, ImportOptions, ImportedCampaign, RuleSet, import as import_all,
+    name_of_import,
 };
 use actcheck_config::resolve_path;
 use actcheck_episodes::{Episode, Mapping, propose};
@@ -73,11 +75,10 @@ pub fn import(args: &ImportArgs) -> Result<u8, Diagnostics> {
     if args.propose {
         return proposed(&converted);
     }
-    let mappings = Mappings::load(args.mapping.as_deref())?;
-    let (files, mut faults) = mapped(&converted, &mappings)?;
-    let rules = rules_for(args.ontology.as_deref(), args.mapping.as_deref(), &files)?;
+    let mappings = Mappings::load(args.mapping.as_deref(), args.ontology.as_deref())?;
+    let (files, mut faults) = mappings.choose(&converted);
     if files.is_empty() {
-        return Err(first_of(faults));
+        return Err(first_of_episodes(faults));
     }
     let history = History::open(&args.history)?;
     let progress = Progress::new(files.len() as u64, None);
@@ -94,33 +95,24 @@ pub fn import(args: &ImportArgs) -> Result<u8, Diagnostics> {
             .map(|path| path.display().to_string())
             .unwrap_or_default(),
     };
-    let mut counts: BTreeMap<String, BTreeMap<Outcome, u64>> = BTreeMap::new();
     let end = import_all(
         &history,
-        &rules,
         &files,
         &options,
         (clock::system().now, &stop),
-        |run| {
-            progress.judged(1, 0);
-            for judgement in run.judgements.iter().flatten() {
-                *counts
-                    .entry(judgement.property.clone())
-                    .or_default()
-                    .entry(judgement.outcome)
-                    .or_default() += 1;
-            }
-        },
+        || progress.judged(1, 0),
     );
     progress.finish();
-    let failed = counts
-        .values()
+    let failed = end
+        .campaigns
+        .iter()
+        .flat_map(|campaign| campaign.properties.values())
         .any(|outcomes| outcomes.contains_key(&Outcome::Failed));
-    print(&end, &counts, args);
+    print(&end.campaigns, args);
     faults.extend(end.faults);
     let has_faults = !faults.is_empty();
     if has_faults {
-        output::print_diagnostics(&first_of(faults));
+        output::print_diagnostics(&first_of_episodes(faults));
     }
     match end.ending {
         Ending::Stopped(faults) => Err(faults),
@@ -128,34 +120,6 @@ pub fn import(args: &ImportArgs) -> Result<u8, Diagnostics> {
         Ending::Finished | Ending::Budget(_) if has_faults => Ok(2),
         Ending::Finished | Ending::Budget(_) => Ok(u8::from(failed)),
     }
-}
-
-/// Prepares the rules: those of the named ontology, or of the mapping's, or the default ones.
-pub(super) fn rules_for(
-    ontology: Option<&Path>,
-    mapping: Option<&Path>,
-    files: &[EpisodeFile<'_>],
-) -> Result<RuleSet, Diagnostics> {
-    let chosen = files.first().map(|file| file.mapping);
-    let written = chosen.and_then(|mapping| mapping.ontology.as_ref());
-    let (rule_files, path) = match (ontology, written) {
-        (None, Some(written)) => match mapping.and_then(Path::parent) {
-            Some(folder) => (Files::Disk, resolve_path(folder, &written.value)),
-            None => {
-                let path = resolve_path(Path::new(MAPPINGS), &written.value);
-                let files = if path.is_file() {
-                    Files::Disk
-                } else {
-                    Files::Shipped
-                };
-                (files, path)
-            }
-        },
-        (given, _) => ontology_file(given),
-    };
-    let rules = RuleSet::prepare(&rule_files, &path)?;
-    output::print_diagnostics(rules.warnings());
-    Ok(rules)
 }
 
 /// Returns the files, and those in the folders, sorted within each folder.
@@ -196,101 +160,133 @@ pub(super) fn found(given: &[PathBuf]) -> Result<Vec<PathBuf>, Diagnostics> {
     faults.or(files)
 }
 
-/// The mappings to choose from.
+/// The mappings to choose from, each with its rules.
 pub(super) struct Mappings {
-    list: Vec<Mapping>,
+    list: Vec<(Mapping, Arc<RuleSet>)>,
     /// Whether the only one was given by name: it is used for every environment.
     is_given: bool,
 }
 
 impl Mappings {
-    pub(super) fn load(given: Option<&Path>) -> Result<Self, Diagnostics> {
-        if let Some(path) = given {
-            let source = Files::Disk.read(path).map_err(|fault| {
-                Diagnostic::error(
-                    "E005",
-                    format!("can't read the mapping {}: {fault}", path.display()),
-                )
-                .help("`actcheck import --propose FILE > mapping.toml` drafts one")
-            })?;
-            return Ok(Self {
-                list: vec![Mapping::parse(&source)?],
-                is_given: true,
-            });
-        }
-        let mut list = Vec::new();
-        let mut faults = Diagnostics::new();
-        let files = if Path::new(MAPPINGS).is_dir() {
-            Files::Disk
-        } else {
-            Files::Shipped
+    /// Reads the given mapping, or all shipped ones, and prepares their rules: those of the given
+    /// ontology, or of the mapping's, or the default ones.
+    pub(super) fn load(given: Option<&Path>, ontology: Option<&Path>) -> Result<Self, Diagnostics> {
+        let (files, paths) = match given {
+            Some(path) => (Files::Disk, vec![path.to_path_buf()]),
+            None => {
+                let folder = Path::new(MAPPINGS);
+                let files = if folder.is_dir() {
+                    Files::Disk
+                } else {
+                    Files::Shipped
+                };
+                let mut paths = files.list(folder);
+                paths.retain(|path| path.extension().is_some_and(|ending| ending == "toml"));
+                (files, paths)
+            }
         };
-        for path in files.list(Path::new(MAPPINGS)) {
-            if path.extension().is_some_and(|ending| ending == "toml")
-                && let Ok(source) = files.read(&path)
-            {
-                match Mapping::parse(&source) {
-                    Ok(mapping) => list.push(mapping),
-                    Err(found) => faults.extend(found),
-                }
+        let mut faults = Diagnostics::new();
+        let mut mappings = Vec::new();
+        for path in paths {
+            match read(&files, &path) {
+                Ok(mapping) => mappings.push((path, mapping)),
+                Err(found) => faults.extend(found),
             }
         }
-        faults.or(Self {
+        let mappings = faults.or(mappings)?;
+        let mut prepared: BTreeMap<PathBuf, Arc<RuleSet>> = BTreeMap::new();
+        let mut list = Vec::new();
+        for (path, mapping) in mappings {
+            let (files, ontology) = ontology_of(&mapping, &files, &path, ontology);
+            let rules = match prepared.get(&ontology) {
+                Some(rules) => Arc::clone(rules),
+                None => {
+                    let rules = Arc::new(RuleSet::prepare(&files, &ontology)?);
+                    output::print_diagnostics(rules.warnings());
+                    prepared.insert(ontology, Arc::clone(&rules));
+                    rules
+                }
+            };
+            list.push((mapping, rules));
+        }
+        Ok(Self {
             list,
-            is_given: false,
+            is_given: given.is_some(),
         })
     }
 
-    /// Returns the mapping for an environment, or `None`.
-    fn of(&self, environment: &str) -> Option<&Mapping> {
-        if self.is_given {
-            return self.list.first();
+    /// Chooses a mapping for each episode. Returns the faults of the other ones.
+    pub(super) fn choose(&self, converted: &Converted) -> (Vec<EpisodeFile<'_>>, Diagnostics) {
+        let mut faults = converted.faults.clone();
+        let mut files = Vec::new();
+        for episode in &converted.episodes {
+            match self.of(episode) {
+                Ok((mapping, rules)) => files.push(EpisodeFile {
+                    path: episode.path.clone(),
+                    named: episode.named.clone(),
+                    mapping,
+                    rules,
+                }),
+                Err(found) => faults.extend(found),
+            }
         }
-        self.list.iter().find(|mapping| mapping.is_for(environment))
+        (files, faults)
+    }
+
+    /// Returns the given mapping, or else the one for an episode's environment.
+    fn of(&self, episode: &ConvertedEpisode) -> Result<&(Mapping, Arc<RuleSet>), Diagnostics> {
+        if let (true, Some(given)) = (self.is_given, self.list.first()) {
+            return Ok(given);
+        }
+        let environment = Episode::environment(&episode.path)?;
+        let found = self
+            .list
+            .iter()
+            .find(|(mapping, _)| mapping.is_for(&environment));
+        found.ok_or_else(|| {
+            let message = format!("{}: no mapping fits the environment `{environment}`", episode.named);
+            Diagnostic::error("E006", message)
+                .help("`actcheck import --propose FILE > mapping.toml` drafts one; then add `--mapping mapping.toml`")
+                .into()
+        })
     }
 }
 
-/// Chooses a mapping for each episode. Returns the faults of the other ones.
-pub(super) fn mapped<'m>(
-    converted: &Converted,
-    mappings: &'m Mappings,
-) -> Result<(Vec<EpisodeFile<'m>>, Diagnostics), Diagnostics> {
-    let mut faults = converted.faults.clone();
-    let mut files = Vec::new();
-    for episode in &converted.episodes {
-        let environment = if mappings.is_given {
-            String::new()
-        } else {
-            match Episode::environment(&episode.path) {
-                Ok(environment) => environment,
-                Err(found) => {
-                    faults.extend(found);
-                    continue;
-                }
-            }
-        };
-        match mappings.of(&environment) {
-            Some(mapping) => files.push(EpisodeFile {
-                path: episode.path.clone(),
-                named: episode.named.clone(),
-                mapping,
-            }),
-            None => faults.push(
-                Diagnostic::error(
-                    "E006",
-                    format!("{}: there is no mapping for the environment `{environment}`", episode.named),
-                )
-                .help("`actcheck import --propose FILE > mapping.toml` drafts one; then add `--mapping mapping.toml`"),
-            ),
+/// Reads a mapping.
+fn read(files: &Files, path: &Path) -> Result<Mapping, Diagnostics> {
+    let source = files.read(path).map_err(|fault| {
+        Diagnostic::error(
+            "E005",
+            format!("can't read the mapping {}: {fault}", path.display()),
+        )
+        .help("`actcheck import --propose FILE > mapping.toml` drafts one")
+    })?;
+    Mapping::parse(&source)
+}
+
+/// The ontology that was given, or the one that a mapping names, or the default one.
+fn ontology_of(
+    mapping: &Mapping,
+    files: &Files,
+    path: &Path,
+    given: Option<&Path>,
+) -> (Files, PathBuf) {
+    match (given, &mapping.ontology) {
+        (None, Some(named)) => {
+            let folder = path.parent().unwrap_or(Path::new(""));
+            let ontology = resolve_path(folder, &named.value);
+            let is_here = ontology.is_file();
+            let files = if is_here { &Files::Disk } else { files };
+            (files.clone(), ontology)
         }
+        _ => ontology_file(given),
     }
-    Ok((files, faults))
 }
 
 /// Prints a draft of a mapping for the first episode.
 fn proposed(converted: &Converted) -> Result<u8, Diagnostics> {
     let Some(first) = converted.episodes.first() else {
-        return Err(first_of(converted.faults.clone()));
+        return Err(first_of_episodes(converted.faults.clone()));
     };
     let (episode, _) = Episode::read(&first.path)?;
     let text = propose(&episode);
@@ -300,12 +296,44 @@ fn proposed(converted: &Converted) -> Result<u8, Diagnostics> {
     Ok(0)
 }
 
-fn print(end: &ImportEnd, counts: &BTreeMap<String, BTreeMap<Outcome, u64>>, args: &ImportArgs) {
-    let Some(campaign) = &end.campaign else {
-        return;
-    };
-    let mut table = Table::new(["property", "passed", "failed", "inapplicable", "rate"]);
-    for (property, outcomes) in counts {
+/// Prints a table for each campaign, or one table of all.
+fn print(campaigns: &[ImportedCampaign], args: &ImportArgs) {
+    if args.format == Format::Text {
+        for campaign in campaigns {
+            let noun = if campaign.runs == 1 {
+                "episode"
+            } else {
+                "episodes"
+            };
+            output::print(&format!(
+                "campaign {}: {} {noun} of {} imported into {}\n\n",
+                campaign.id,
+                campaign.runs,
+                campaign.engine,
+                args.history.display()
+            ));
+            let mut table = Table::new(COLUMNS);
+            table.rows = rows(campaign);
+            output::print(&table.render(args.format.into(), output::page()));
+        }
+    } else {
+        let mut table = Table::new(std::iter::once("campaign").chain(COLUMNS));
+        for campaign in campaigns {
+            table.rows.extend(rows(campaign).into_iter().map(|mut row| {
+                row.insert(0, json!(campaign.id));
+                row
+            }));
+        }
+        output::print(&table.render(args.format.into(), output::page()));
+    }
+}
+
+/// Columns of a table of imported outcomes.
+const COLUMNS: [&str; 5] = ["property", "passed", "failed", "inapplicable", "rate"];
+
+/// A row for each property.
+fn rows(campaign: &ImportedCampaign) -> Vec<Vec<Value>> {
+    let row = |(property, outcomes): (&String, &BTreeMap<Outcome, u64>)| {
         let count = |outcome| outcomes.get(&outcome).copied().unwrap_or_default();
         let (passed, failed) = (count(Outcome::Passed), count(Outcome::Failed));
         let rate = wilson(passed, passed + failed).map_or_else(String::new, |interval| {
@@ -316,41 +344,23 @@ fn print(end: &ImportEnd, counts: &BTreeMap<String, BTreeMap<Outcome, u64>>, arg
                 100.0 * interval.high
             )
         });
-        table.rows.push(vec![
+        vec![
             json!(names::local(property)),
             json!(passed),
             json!(failed),
             json!(count(Outcome::Inapplicable)),
             json!(rate),
-        ]);
-    }
-    if args.format == Format::Text {
-        let noun = if end.imported == 1 {
-            "episode"
-        } else {
-            "episodes"
-        };
-        output::print(&format!(
-            "campaign {campaign}: {} {noun} imported into {}\n\n",
-            end.imported,
-            args.history.display()
-        ));
-    }
-    output::print(&table.render(args.format.into(), output::page()));
+        ]
+    };
+    campaign.properties.iter().map(row).collect()
 }
 
-pub(super) fn first_of(faults: Diagnostics) -> Diagnostics {
-    let left_out = faults.len().saturating_sub(MAX_LISTED);
-    let mut listed = Diagnostics::new();
-    faults
-        .into_iter()
-        .take(MAX_LISTED)
-        .for_each(|fault| listed.push(fault));
-    if left_out > 0 {
-        listed.push(Diagnostic::error(
+/// The first faults of episodes, and the number of the others.
+pub(super) fn first_of_episodes(faults: Diagnostics) -> Diagnostics {
+    output::first_of(faults, MAX_LISTED, |more| {
+        Diagnostic::error(
             "E007",
-            format!("{left_out} more episodes could not be imported"),
-        ));
-    }
-    listed
+            format!("{more} more episodes could not be imported"),
+        )
+    })
 }

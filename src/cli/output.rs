@@ -68,6 +68,24 @@ pub fn print_error_text(text: &str) {
         .write_all(printable_in_colour(text).as_bytes());
 }
 
+/// Returns the first `most` faults and, if there are more, one that tells their number.
+pub fn first_of(
+    faults: Diagnostics,
+    most: usize,
+    others: impl Fn(usize) -> Diagnostic,
+) -> Diagnostics {
+    let left_out = faults.len().saturating_sub(most);
+    let mut first = Diagnostics::new();
+    faults
+        .into_iter()
+        .take(most)
+        .for_each(|fault| first.push(fault));
+    if left_out > 0 {
+        first.push(others(left_out));
+    }
+    first
+}
+
 /// Most diagnostics that are printed at once: the excerpt of each takes time in proportion to its
 /// file.
 const MOST_PRINTED: usize = 200;

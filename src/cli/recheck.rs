@@ -98,7 +98,12 @@ pub fn recheck(args: &RecheckArgs) -> Result<u8, Diagnostics> {
     match end.ending {
         Ending::Stopped(faults) => Err(faults),
         Ending::Interrupted => Ok(stop::INTERRUPTED),
-        Ending::Finished if !end.faults.is_empty() => Err(first_of(end.faults)),
+        Ending::Finished if !end.faults.is_empty() => {
+            let first = output::first_of(end.faults, MAX_LISTED, |more| {
+                Diagnostic::error("X035", format!("{more} more runs could not be judged"))
+            });
+            Err(first)
+        }
         Ending::Finished | Ending::Budget(_) => Ok(summary.exit_code()),
     }
 }
@@ -173,20 +178,4 @@ fn runs(history: &History, campaigns: &[String]) -> Result<Vec<RunRow>, Diagnost
         .into());
     }
     Ok(runs)
-}
-
-fn first_of(faults: Diagnostics) -> Diagnostics {
-    let left_out = faults.len().saturating_sub(MAX_LISTED);
-    let mut told = Diagnostics::new();
-    faults
-        .into_iter()
-        .take(MAX_LISTED)
-        .for_each(|fault| told.push(fault));
-    if left_out > 0 {
-        told.push(Diagnostic::error(
-            "X035",
-            format!("{left_out} more runs could not be judged"),
-        ));
-    }
-    told
 }
