@@ -81,6 +81,18 @@ impl Series {
         }
     }
 
+    /// Creates an empty series of a recorded quantity, with the resolution of all our recordings: one
+    /// step in a unit if no quantity with this local name is recorded.
+    pub fn recorded(thing: &str, other: &str, quantity: &str) -> Self {
+        let steps_per_unit = Self::resolution(quantity).unwrap_or(1);
+        Self::new(thing, other, quantity, steps_per_unit)
+    }
+
+    /// Adds a sample in the quantity's unit.
+    pub fn push(&mut self, value: f64) {
+        self.steps.push(Self::steps_of(value, self.steps_per_unit));
+    }
+
     /// Returns a value as a number of steps; values beyond the range become its ends, and NaN
     /// becomes 0.
     pub fn steps_of(value: f64, steps_per_unit: u32) -> i32 {

@@ -21,8 +21,10 @@ use crate::{
 /// Largest record of a file: a damaged length must not request more memory. Unit: bytes. The model
 /// is the largest one, with some hundred kilobytes.
 const LARGEST_RECORD: usize = 64 << 20;
-/// Most states of an episode: nine hours at 30 states a second.
+/// Most states of an episode.
 const MOST_STATES: usize = 1_000_000;
+/// Longest episode. Unit: seconds.
+const LONGEST_SECS: f64 = 4.0 * 3600.0;
 /// Largest absolute value of positions, velocities and forces. Larger ones come from a simulation
 /// that diverged.
 const LARGEST_VALUE: f64 = 1e6;
@@ -130,6 +132,8 @@ enum FileFault {
     Value(String),
     #[error("it has more than {MOST_STATES} states")]
     TooLong,
+    #[error("it lasts {0} s, longer than {LONGEST_SECS} s")]
+    TooLate(f64),
 }
 
 impl FileFault {
@@ -158,7 +162,7 @@ impl FileFault {
                 "E003",
                 "the simulation diverged, or the file was edited: leave this episode out",
             ),
-            Self::TooLong => ("E004", "record shorter episodes"),
+            Self::TooLong | Self::TooLate(_) => ("E004", "record shorter episodes"),
         };
         (code, self.to_string(), help)
     }
@@ -177,7 +181,8 @@ struct Reader {
     by_name: HashMap<String, usize>,
     /// States by their time, in nanoseconds.
     states: BTreeMap<u64, State>,
-    marks: Vec<Mark>,
+    /// Marks, each with its time in nanoseconds.
+    marks: Vec<(u64, Mark)>,
     has_contacts: bool,
 }
 
@@ -248,14 +253,15 @@ impl Reader {
                         mark.event
                     )));
                 }
-                self.marks.push(Mark {
-                    time_secs: secs(time),
+                let mark = Mark {
+                    time_secs: 0.0,
                     action: mark.action,
                     begins: mark.event == "begin",
                     parameters: mark.parameters,
                     reported: mark.reported,
                     message: mark.message.unwrap_or_default(),
-                });
+                };
+                self.marks.push((time, mark));
             }
             _ => {}
         }
@@ -268,7 +274,6 @@ impl Reader {
             return Err(FileFault::TooLong);
         }
         Ok(self.states.entry(time).or_insert_with(|| State {
-            time_secs: secs(time),
             poses: self.fixed.clone(),
             ..State::default()
         }))
@@ -476,19 +481,30 @@ impl Reader {
         let model = self
             .model
             .ok_or(FileFault::Missing("message on `/model`"))?;
-        if self.states.is_empty() {
+        let (Some(begin), Some(end)) = (
+            self.states.keys().next().copied(),
+            self.states.keys().next_back().copied(),
+        ) else {
             return Err(FileFault::Missing("states"));
+        };
+        if secs(end - begin) > LONGEST_SECS {
+            return Err(FileFault::TooLate(secs(end - begin)));
         }
-        let begin = self.states.keys().next().copied().unwrap_or_default();
-        let mut states: Vec<State> = self.states.into_values().collect();
-        for state in &mut states {
-            state.time_secs -= secs(begin);
-        }
+        // Other programs count time from another moment than the first state.
+        let since_begin = |time: u64| secs(time.saturating_sub(begin));
+        let states = self.states.into_iter().map(|(time, mut state)| {
+            state.time_secs = since_begin(time);
+            state
+        });
+        let marks = self.marks.into_iter().map(|(time, mut mark)| {
+            mark.time_secs = since_begin(time);
+            mark
+        });
         Ok(Episode {
             about,
             model,
-            states,
-            marks: self.marks,
+            states: states.collect(),
+            marks: marks.collect(),
             lacks,
         })
     }
@@ -668,4 +684,87 @@ fn ellipsoid([a, b, c]: [f64; 3]) -> Vec<[f64; 3]> {
         }
     }
     points
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::path::{Path, PathBuf};
+
+    use mcap::Writer;
+    use mcap::records::MessageHeader;
+
+    use super::*;
+
+    /// An episode file of the tests, written again with other times of its messages, and a mark at
+    /// its end.
+    fn with_times(folder: &Path, time_of: impl Fn(u64) -> u64) -> PathBuf {
+        let source = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../../tests/data/episodes/good-000001.mcap");
+        let path = folder.join("episode.mcap");
+        let mut writer = Writer::new(File::create(&path).expect("a new file")).expect("a writer");
+        let mut channels: HashMap<u16, u16> = HashMap::new();
+        let none = BTreeMap::new();
+        let mut last = 0;
+        let mut records = Records::open(&source).expect("the file exists");
+        records
+            .each(|record| {
+                match record {
+                    Record::Channel(channel) => {
+                        let id = writer.add_channel(0, &channel.topic, "", &none)?;
+                        channels.insert(channel.id, id);
+                    }
+                    Record::Message { header, data } => {
+                        last = last.max(time_of(header.log_time));
+                        let header = MessageHeader {
+                            channel_id: channels[&header.channel_id],
+                            log_time: time_of(header.log_time),
+                            ..header
+                        };
+                        writer.write_to_known_channel(&header, &data)?;
+                    }
+                    Record::Metadata(metadata) => writer.write_metadata(&metadata)?,
+                    _ => {}
+                }
+                Ok(())
+            })
+            .expect("the file can be copied");
+        let channel_id = writer
+            .add_channel(0, "/marks", "", &none)
+            .expect("a channel");
+        let mark = br#"{"action": "Pick", "event": "begin", "parameters": {}}"#;
+        let header = MessageHeader {
+            channel_id,
+            sequence: 0,
+            log_time: last,
+            publish_time: last,
+        };
+        writer
+            .write_to_known_channel(&header, mark)
+            .expect("a mark");
+        writer.finish().expect("a finished file");
+        path
+    }
+
+    #[test]
+    fn times_count_from_the_first_state() {
+        let folder = tempfile::tempdir().expect("a folder");
+        // As of a clock that counts since 1970.
+        let path = with_times(folder.path(), |time| time + 1_796_000_000_123_456_789);
+        let (episode, _) = Episode::read(&path).expect("the file is valid");
+        let times = |at: usize| episode.states[at].time_secs;
+        let last = times(episode.states.len() - 1);
+        assert_eq!(times(0).to_bits(), 0.0f64.to_bits());
+        assert!((times(1) - 0.1).abs() < 1e-9, "{}", times(1));
+        assert_eq!(episode.marks[0].time_secs.to_bits(), last.to_bits());
+    }
+
+    #[test]
+    fn an_endless_episode_is_a_fault() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = with_times(folder.path(), |time| time * 1_000_000);
+        let faults = Episode::read(&path).expect_err("it lasts days");
+        let codes: Vec<&str> = faults.into_iter().map(|fault| fault.code).collect();
+        assert_eq!(codes, ["E004"]);
+    }
 }

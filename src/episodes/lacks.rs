@@ -35,7 +35,7 @@ pub enum Quantity {
     Frictions,
     /// Shapes of bodies.
     Shapes,
-    /// The fingers.
+    /// The fingers' contacts.
     Fingers,
     /// The gap between the fingers.
     Opening,
@@ -55,8 +55,6 @@ impl Quantity {
             &[
                 "touches",
                 "restsOn",
-                "leftTouches",
-                "rightTouches",
                 "first",
                 "second",
                 "start",
@@ -66,11 +64,6 @@ impl Quantity {
                 "secondLink",
                 "seenAt",
                 "maxDepth",
-                "fingersMeet",
-                "heldTime",
-                "heldTilt",
-                "heldObject",
-                "held",
                 "contactForce",
             ],
         ),
@@ -175,18 +168,10 @@ impl Quantity {
                 "baseYaw",
                 "gripperDistance",
                 "clearance",
-                "leftTouches",
-                "rightTouches",
-                "opening",
                 "firstLink",
                 "secondLink",
                 "seenAt",
                 "maxDepth",
-                "fingersMeet",
-                "heldTime",
-                "heldTilt",
-                "heldObject",
-                "held",
             ],
         ),
     ];
@@ -218,9 +203,17 @@ impl Quantity {
 }
 
 impl Lacks {
-    /// Notes that a quantity is missing.
+    /// Notes that a quantity is missing, and with it those that are measured by it.
     pub fn add(&mut self, quantity: Quantity) {
         self.quantities.insert(quantity);
+        match quantity {
+            Quantity::Contacts => self.add(Quantity::Fingers),
+            Quantity::Robot => {
+                self.add(Quantity::Fingers);
+                self.add(Quantity::Opening);
+            }
+            _ => {}
+        }
     }
 
     /// Whether a quantity is missing.

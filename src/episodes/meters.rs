@@ -18,13 +18,6 @@ const SAME_CONTACT_SECS: f64 = 0.05;
 const RANGE_M: f64 = 0.5;
 /// A motor above this share of its effort limit is overloaded. As in our own traces.
 const OVERLOAD_SHARE: f64 = 0.99;
-/// Steps of positions, angles and components of quaternions in a metre, a radian, or one.
-const POSE_STEPS: u32 = 50_000;
-/// Steps of velocities in 1 m/s or 1 rad/s.
-const VELOCITY_STEPS: u32 = 2_000;
-/// Steps of forces and torques in 1 N or 1 N·m.
-const FORCE_STEPS: u32 = 50;
-
 const POSE: [&str; 7] = ["x", "y", "z", "qx", "qy", "qz", "qw"];
 const VELOCITY: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
 
@@ -324,38 +317,32 @@ fn samples(watched: &Watched<'_>, states: &[State], touches: &[Touches], lacks: 
         recorded.poses(&thing.id, &poses);
         if has_velocities {
             for (column, quantity) in VELOCITY.into_iter().enumerate() {
-                recorded.put(&thing.id, "", quantity, VELOCITY_STEPS, |at| {
+                recorded.put(&thing.id, "", quantity, |at| {
                     watched.velocities(thing, &states[at])[column / 3][column % 3]
                 });
             }
         }
-        recorded.put(&thing.id, "", "held", 1, |at| {
+        recorded.put(&thing.id, "", "held", |at| {
             f64::from(u8::from(watched.held(&touches[at]).contains(&idx)))
         });
     }
     let hands: Vec<Pose> = states.iter().map(|state| watched.hand(state)).collect();
     recorded.poses("gripper", &hands);
-    recorded.put("gripper", "", "opening", POSE_STEPS, |at| {
-        watched.opening(&states[at])
-    });
+    recorded.put("gripper", "", "opening", |at| watched.opening(&states[at]));
     for (column, quantity) in ["baseX", "baseY", "baseYaw"].into_iter().enumerate() {
-        recorded.put("robot", "", quantity, POSE_STEPS, |at| {
+        recorded.put("robot", "", quantity, |at| {
             watched.base(&states[at])[column]
         });
     }
     for (idx, joint) in watched.robot_joints() {
         let name = format!("joint/{}", joint.name);
-        for (quantity, steps, values) in [
-            (
-                "position",
-                POSE_STEPS,
-                State::positions as fn(&State) -> &[f64],
-            ),
-            ("velocity", VELOCITY_STEPS, State::speeds),
-            ("effort", FORCE_STEPS, State::efforts),
+        for (quantity, values) in [
+            ("position", State::positions as fn(&State) -> &[f64]),
+            ("velocity", State::speeds),
+            ("effort", State::efforts),
         ] {
             if !values(&states[0]).is_empty() {
-                recorded.put(&name, "", quantity, steps, |at| {
+                recorded.put(&name, "", quantity, |at| {
                     values(&states[at]).get(idx).copied().unwrap_or_default()
                 });
             }
@@ -368,7 +355,7 @@ fn samples(watched: &Watched<'_>, states: &[State], touches: &[Touches], lacks: 
         let mut pair =
             [owners.0, owners.1].map(|owner| watched.cast.name(owner, &watched.episode.model));
         pair.sort();
-        recorded.put(&pair[0], &pair[1], "contactForce", FORCE_STEPS, |at| {
+        recorded.put(&pair[0], &pair[1], "contactForce", |at| {
             touches[at].get(&owners).map_or(0.0, |touch| touch.normal_n)
         });
     }
@@ -380,6 +367,8 @@ fn samples(watched: &Watched<'_>, states: &[State], touches: &[Touches], lacks: 
 }
 
 /// Returns the median time between two states, or `None` if there is only one. Unit: seconds.
+///
+/// If the times are very irregular, it is longer: there are at most four samples for each state.
 fn period(states: &[State]) -> Option<f64> {
     let mut steps: Vec<f64> = states
         .windows(2)
@@ -387,7 +376,9 @@ fn period(states: &[State]) -> Option<f64> {
         .filter(|step| *step > 0.0)
         .collect();
     steps.sort_by(f64::total_cmp);
-    steps.get(steps.len() / 2).copied()
+    let end_secs = since(states, states.len() - 1);
+    let median = steps.get(steps.len() / 2)?;
+    Some(median.max(end_secs / (4 * states.len()) as f64))
 }
 
 /// The series of some states.
@@ -397,26 +388,15 @@ struct Recorded<'a> {
 }
 
 impl Recorded<'_> {
-    fn put(
-        &mut self,
-        thing: &str,
-        other: &str,
-        quantity: &str,
-        steps_per_unit: u32,
-        value: impl Fn(usize) -> f64,
-    ) {
-        let mut series = Series::new(thing, other, quantity, steps_per_unit);
-        series.steps = self
-            .picked
-            .iter()
-            .map(|at| Series::steps_of(value(*at), steps_per_unit))
-            .collect();
+    fn put(&mut self, thing: &str, other: &str, quantity: &str, value: impl Fn(usize) -> f64) {
+        let mut series = Series::recorded(thing, other, quantity);
+        self.picked.iter().for_each(|at| series.push(value(*at)));
         self.series.push(series);
     }
 
     fn poses(&mut self, thing: &str, poses: &[Pose]) {
         for (column, quantity) in POSE.into_iter().enumerate() {
-            self.put(thing, "", quantity, POSE_STEPS, |at| match column {
+            self.put(thing, "", quantity, |at| match column {
                 0..3 => poses[at].position[column],
                 _ => poses[at].rotation[column - 3],
             });

@@ -179,14 +179,8 @@ impl Course {
     /// Returns the samples, with the resolution of our own.
     pub(crate) fn samples(&self) -> Samples {
         let series = self.series.iter().map(|quantity| {
-            let per_unit = Series::resolution(&quantity.name).unwrap_or(1);
-            let mut series =
-                Series::new(&quantity.thing, &quantity.other, &quantity.name, per_unit);
-            series.steps = quantity
-                .values
-                .iter()
-                .map(|value| Series::steps_of(*value, per_unit))
-                .collect();
+            let mut series = Series::recorded(&quantity.thing, &quantity.other, &quantity.name);
+            quantity.values.iter().for_each(|value| series.push(*value));
             series
         });
         Samples {

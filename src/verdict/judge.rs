@@ -23,9 +23,8 @@ pub enum Fate {
 /// Returns the outcomes of an action's success properties, in the action's order.
 ///
 /// `findings` holds the rules' findings for these properties, and for the action's preconditions and
-/// premises. It
-/// is ignored unless the fate is `Completed`. A property without findings is `broken`: verdicts are
-/// never invented.
+/// premises. It is ignored unless the fate is `Completed`. A property without findings is `broken`:
+/// verdicts are never invented.
 pub fn judge(
     ontology: &Ontology,
     action: &Action,

@@ -9,13 +9,6 @@ use crate::engine::Owner;
 use crate::object::Object;
 use actcheck_data::{Pose, Samples, Series};
 
-/// Steps of positions, angles and components of quaternions in a metre, a radian, or one.
-const POSE_STEPS: u32 = 50_000;
-/// Steps of velocities in 1 m/s or 1 rad/s.
-const VELOCITY_STEPS: u32 = 2_000;
-/// Steps of forces and torques in 1 N or 1 N·m.
-const FORCE_STEPS: u32 = 50;
-
 const POSE: [&str; 7] = ["x", "y", "z", "qx", "qy", "qz", "qw"];
 const VELOCITY: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];
 const BASE: [&str; 6] = [
@@ -32,8 +25,8 @@ const BASE: [&str; 6] = [
 pub(super) struct SampleMeter {
     series: Vec<Series>,
     count: usize,
-    /// Contact forces as numbers of steps, each with the number of its sample.
-    contacts: BTreeMap<(Owner, Owner), Vec<(usize, i32)>>,
+    /// Contact forces in newtons, each with the number of its sample.
+    contacts: BTreeMap<(Owner, Owner), Vec<(usize, f64)>>,
 }
 
 impl World {
@@ -41,24 +34,16 @@ impl World {
     pub(super) fn begin_samples(&mut self) {
         let mut series = Vec::new();
         for object in self.sampled() {
-            series.extend(POSE.map(|quantity| Series::new(&object, "", quantity, POSE_STEPS)));
-            series.extend(
-                VELOCITY.map(|quantity| Series::new(&object, "", quantity, VELOCITY_STEPS)),
-            );
-            series.push(Series::new(&object, "", "held", 1));
+            let of_object = POSE.into_iter().chain(VELOCITY).chain(["held"]);
+            series.extend(of_object.map(|quantity| Series::recorded(&object, "", quantity)));
         }
-        series.extend(POSE.map(|quantity| Series::new("gripper", "", quantity, POSE_STEPS)));
-        series.push(Series::new("gripper", "", "opening", POSE_STEPS));
-        series.extend(BASE.map(|quantity| Series::new("robot", "", quantity, POSE_STEPS)));
+        let of_gripper = POSE.into_iter().chain(["opening"]);
+        series.extend(of_gripper.map(|quantity| Series::recorded("gripper", "", quantity)));
+        series.extend(BASE.map(|quantity| Series::recorded("robot", "", quantity)));
         for joint in &self.robot.model.joints {
-            let of = |quantity, steps| {
-                Series::new(&format!("joint/{}", joint.name), "", quantity, steps)
-            };
-            series.extend([
-                of("position", POSE_STEPS),
-                of("velocity", VELOCITY_STEPS),
-                of("effort", FORCE_STEPS),
-            ]);
+            let name = format!("joint/{}", joint.name);
+            let of_joint = ["position", "velocity", "effort"];
+            series.extend(of_joint.map(|quantity| Series::recorded(&name, "", quantity)));
         }
         self.recorder.samples = SampleMeter {
             series,
@@ -74,9 +59,7 @@ impl World {
         let mut series = meter.series.iter_mut();
         let mut put = |value: f64| {
             if let Some(series) = series.next() {
-                series
-                    .steps
-                    .push(Series::steps_of(value, series.steps_per_unit));
+                series.push(value);
             }
         };
         for (idx, object) in self
@@ -121,12 +104,8 @@ impl World {
                 .for_each(|of| put(of.get(idx).copied().unwrap_or(0.0)));
         }
         for (pair, touch) in touches {
-            let force = Series::steps_of(touch.normal_n, FORCE_STEPS);
-            meter
-                .contacts
-                .entry(*pair)
-                .or_default()
-                .push((meter.count, force));
+            let forces = meter.contacts.entry(*pair).or_default();
+            forces.push((meter.count, touch.normal_n));
         }
         meter.count += 1;
         self.recorder.samples = meter;
@@ -142,10 +121,12 @@ impl World {
         for ((first, second), forces) in contacts {
             let mut pair = [self.name_of(first), self.name_of(second)];
             pair.sort();
-            let mut contact = Series::new(&pair[0], &pair[1], "contactForce", FORCE_STEPS);
-            let mut steps = vec![0; count];
-            forces.into_iter().for_each(|(at, force)| steps[at] = force);
-            contact.steps = steps.into();
+            let mut contact = Series::recorded(&pair[0], &pair[1], "contactForce");
+            let mut values = vec![0.0; count];
+            forces
+                .into_iter()
+                .for_each(|(at, force)| values[at] = force);
+            values.into_iter().for_each(|value| contact.push(value));
             series.push(contact);
         }
         Samples {
