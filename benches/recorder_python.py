@@ -1,4 +1,4 @@
-"""What does recording cost? CPU time and bytes a step, beside the environment's own.
+"""Measures the cost of recording: CPU time and bytes for each step, beside those of the environment alone.
 
 `python benches/recorder_python.py robosuite Lift Stack PickPlaceCan Door` or `… libero libero_spatial 0 1 2`, in an environment with
 that package, mujoco, mcap and actcheck. The time is that of one process: other programs should be quiet.

@@ -108,7 +108,7 @@ def grasped(lift: Lift) -> None:
 
 
 def teleported(lift: Lift) -> None:
-    """Puts the cube into the air while the robot stands idle."""
+    """Puts the cube into the air while the robot does nothing."""
     lift.data.joint("cube_joint0").qpos[2] += 0.2
     mujoco.mj_forward(lift.model, lift.data)
 

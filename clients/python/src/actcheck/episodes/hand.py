@@ -129,7 +129,7 @@ class Hand:
         return str(model.body(int(model.body(tip).parentid[0])).name)
 
     def _grasp(self, body: str) -> Array | None:
-        """Where the open fingers touch nothing and the closed ones touch the body from both sides; `None` if there is no such place.
+        """Returns a pose in which the open fingers touch nothing and the closed ones touch the body from both sides; `None` if there is none.
 
         The robot's present posture is moved as a whole: the object is tried at the places relative to the hand instead.
         """

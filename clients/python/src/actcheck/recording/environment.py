@@ -38,7 +38,7 @@ def attribute(owner: Any, path: str) -> Any:
     for name in path.split("."):
         try:
             owner = getattr(owner, name, None)
-        except Exception:  # noqa: BLE001 - a property of somebody's environment may raise anything
+        except Exception:  # noqa: BLE001 - a property of an unknown environment may raise any exception
             return None
         if owner is None:
             return None

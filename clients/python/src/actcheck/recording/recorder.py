@@ -45,7 +45,7 @@ def record(*arguments: Any, name: str | None = None) -> Recorder:
     The files are named `NAME-000001.mcap`, …; none is overwritten. `name` is by default the environment's. A path that ends in
     `.mcap` is the file of the first episode; a second episode is then refused.
 
-    Raises `RecordingFault` if there is no MuJoCo simulation, or mujoco (at least 3.3) or mcap is missing.
+    Raises `RecordingFault` if the environment has no MuJoCo simulation, if mcap is missing, or if mujoco is missing or older than 3.3.
     """
     _supported_mujoco()
     if len(arguments) == 2:
