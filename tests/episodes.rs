@@ -340,6 +340,14 @@ fn faults_are_reported_and_store_nothing() {
         format!("{mapping}\n[[actions]]\naction = \"Pik\"\nfrom = \"begin\"\n").as_bytes(),
     );
     written(
+        "twice.toml",
+        format!("{mapping}\n[objects.other]\nbody = \"cub*\"\n").as_bytes(),
+    );
+    written(
+        "world.toml",
+        format!("{mapping}\n[objects.ground]\nbody = \"world\"\n").as_bytes(),
+    );
+    written(
         "unknown.toml",
         format!("{mapping}\n[[actions]]\naction = \"Pik\"\npickObject = \"cub\"\n").as_bytes(),
     );
@@ -354,6 +362,12 @@ fn faults_are_reported_and_store_nothing() {
         (&good, "misspelt.toml", vec!["E010", "did you mean `cube`?"]),
         (&good, "axis.toml", vec!["E012", "C003"]),
         (&good, "action.toml", vec!["E015"]),
+        (
+            &good,
+            "twice.toml",
+            vec!["E022", "it belongs to the object `cube`", "twice.toml:"],
+        ),
+        (&good, "world.toml", vec!["E022", "it belongs to the floor"]),
         (
             &good,
             "unknown.toml",
@@ -376,6 +390,57 @@ fn faults_are_reported_and_store_nothing() {
         let stored = fs::read_dir(campaigns).map_or(0, Iterator::count);
         assert_eq!(stored, 0, "{episode} {mapping}");
     }
+}
+
+/// An import of episodes of several engines makes a campaign for each.
+#[test]
+fn each_engine_has_its_own_campaign() {
+    let folder = tempfile::tempdir().unwrap();
+    let good = fs::read(data("good-000001.mcap")).unwrap();
+    let replaced = |bytes: &[u8], from: &[u8], to: &[u8]| {
+        let at = bytes
+            .windows(from.len())
+            .position(|window| window == from)
+            .unwrap();
+        [&bytes[..at], to, &bytes[at + from.len()..]].concat()
+    };
+    let other = replaced(
+        &good,
+        b"\x06\0\0\0engine\0\0\0\0\x0e\0\0\0engine_version\0\0\0\0",
+        b"\x06\0\0\0engine\x04\0\0\0Ours\x06\0\0\0note.a\x04\0\0\x001234",
+    );
+    // A checksum of 0 is not checked.
+    let end = b"\x0f\x04\0\0\0\0\0\0\0";
+    let at = other
+        .windows(end.len())
+        .rposition(|window| window == end)
+        .unwrap()
+        + end.len();
+    let other = [&other[..at], &[0; 4], &other[at + 4..]].concat();
+    for (name, bytes) in [("1.mcap", &good), ("2.mcap", &other), ("3.mcap", &good)] {
+        fs::write(folder.path().join(name), bytes).unwrap();
+    }
+    let files = ["1.mcap", "2.mcap", "3.mcap"];
+    let mapping = file("made.toml");
+    let mut arguments = vec!["import", "--mapping", &mapping, "--history", "h"];
+    arguments.extend(files);
+    let output = actcheck(folder.path(), &arguments);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let text = stdout(&output);
+    assert!(text.contains("2 episodes of an unknown engine"), "{text}");
+    assert!(text.contains("1 episode of Ours"), "{text}");
+    let output = actcheck(
+        folder.path(),
+        &["list", "--history", "h", "--format", "json"],
+    );
+    let listed: Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let runs: Vec<u64> = listed
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|row| row["runs"].as_u64().unwrap())
+        .collect();
+    assert_eq!(runs, [2, 1], "{listed:#}");
 }
 
 /// Every cut and many flips of a file are refused or read, and never a panic.

@@ -203,7 +203,8 @@ impl Mapping {
     /// own name, the others with everything that they carry.
     ///
     /// # Errors
-    /// E010 for each name that no body, site or joint has.
+    /// E010 for each name that no body, site or joint has, and E022 for each body that belongs to two
+    /// things.
     pub fn cast(&self, episode: &Episode) -> Result<Cast, Diagnostics> {
         let mut casting = Casting {
             mapping: self,
@@ -409,6 +410,10 @@ impl Casting<'_> {
                 continue;
             };
             let thing = Owner::Thing(roots.len());
+            let taken = bodies.iter().find(|body| owners[**body].is_some());
+            if let Some(taken) = taken.copied() {
+                self.taken_twice(object, taken, owners[taken], &roots);
+            }
             bodies
                 .into_iter()
                 .filter(|body| *body > 0)
@@ -417,6 +422,32 @@ impl Casting<'_> {
         }
         self.inherit(&mut owners, &mut roots);
         self.assemble(episode, &owners, roots)
+    }
+
+    /// E022: reports that a body already belongs to the robot, to an object or to the floor.
+    fn taken_twice(
+        &mut self,
+        object: &ObjectNames,
+        body: usize,
+        owner: Option<Owner>,
+        roots: &[(String, usize, String, Option<Vector3<f64>>)],
+    ) {
+        let of = match owner {
+            Some(Owner::Thing(idx)) => format!("the object `{}`", roots[idx].0),
+            Some(Owner::Link(_)) => "the robot".to_owned(),
+            _ => "the floor".to_owned(),
+        };
+        let name = &self.model.bodies[body].name;
+        let message = format!(
+            "the body `{name}` can't belong to the object `{}`: it belongs to {of}",
+            object.id
+        );
+        let fault = Diagnostic::error("E022", message)
+            .help("write patterns that do not have a body in common; the first body of an episode is the floor");
+        self.faults.push(match object.bodies.first() {
+            Some(name) => fault.at(&self.mapping.source, name.span.clone()),
+            None => fault,
+        });
     }
 
     /// Gives an owner to every body that the mapping does not name. Bodies come after those that

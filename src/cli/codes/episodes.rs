@@ -136,4 +136,10 @@ const CODES_E: &[Code] = &[
         "the mapping gives the object another id, or the recorder marked another name",
         "take the suggested id, or the name of the object's body",
     ),
+    code(
+        "E022",
+        "a body belongs to two things",
+        "patterns of two objects, or of an object and the robot, fit the same body; or an object is the world's own body",
+        "write patterns that do not have a body in common",
+    ),
 ];
