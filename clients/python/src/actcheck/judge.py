@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 Values = dict[Any, Any]
 
 MISSING = (
-    "actcheck.Judge needs the compiled rules, which this installation lacks: install the wheel with `pip install actcheck`, "
-    "or run `make judge` in a checkout"
+    "actcheck.Judge needs the compiled rules, which this installation lacks: in a checkout of actcheck, "
+    "run `make judge`, or write a wheel with `make wheel` and install it"
 )
 
 

@@ -30,7 +30,7 @@ class EpisodeFile:
         try:
             from mcap.writer import CompressionType, Writer
         except ImportError as fault:
-            raise RecordingFault('the package `mcap` is missing: pip install "actcheck[record]"') from fault
+            raise RecordingFault("the package `mcap` is missing: pip install mcap") from fault
         self.path = path
         self._stream = _created(path)
         self._writer = Writer(self._stream, compression=CompressionType.ZSTD, enable_data_crcs=True)
