@@ -299,14 +299,15 @@ fn proposed(converted: &Converted) -> Result<u8, Diagnostics> {
 /// Prints a table for each campaign, or one table of all.
 fn print(campaigns: &[ImportedCampaign], args: &ImportArgs) {
     if args.format == Format::Text {
-        for campaign in campaigns {
+        for (number, campaign) in campaigns.iter().enumerate() {
+            let space = if number == 0 { "" } else { "\n" };
             let noun = if campaign.runs == 1 {
                 "episode"
             } else {
                 "episodes"
             };
             output::print(&format!(
-                "campaign {}: {} {noun} of {} imported into {}\n\n",
+                "{space}campaign {}: {} {noun} of {} imported into {}\n\n",
                 campaign.id,
                 campaign.runs,
                 campaign.engine,
