@@ -63,6 +63,7 @@ mod model_folders;
 mod models;
 mod more_scenes;
 mod move_to;
+mod mujoco_models;
 mod names;
 mod new_project;
 mod new_things;

@@ -222,10 +222,9 @@ mod tests {
                 .fold(profile.urdf.text.to_string(), |text, speed| {
                     text.replace(&format!("velocity=\"{speed}\""), "velocity=\"25\"")
                 });
-            profile.urdf = Source::new(
-                "fast.urdf",
-                fast.replacen("effort=\"120\"", "effort=\"10\"", 1),
-            );
+            let fast = fast.replacen("effort=\"120\"", "effort=\"10\"", 1);
+            let fast = Source::new("fast.urdf", fast);
+            profile = actcheck_config::robot::with_urdf(profile, fast).expect("it is a URDF");
         }
         let start = RobotStart {
             profile: Arc::new(profile),

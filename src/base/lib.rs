@@ -54,7 +54,7 @@ pub use run_facts::{ActionFacts, CONSTANT_PROPERTIES, RunFacts, Triple};
 pub use scratch::ScratchFolder;
 pub use shard::{ParseShardError, Shard};
 pub use shell::ShellLine;
-pub use source::{Source, Span};
+pub use source::{Source, SourceSpan, Span};
 pub use sparql_size::{sparql_excess, unclosed_braces};
 pub use steps::Steps;
 pub use suggest::{did_you_mean, misspelt, nearest};

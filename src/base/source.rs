@@ -17,6 +17,25 @@ pub struct Source {
     pub text: Arc<str>,
 }
 
+/// A place in a text.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SourceSpan {
+    /// The text.
+    pub source: Source,
+    /// The place in it.
+    pub span: Span,
+}
+
+impl Default for SourceSpan {
+    /// A place in no text.
+    fn default() -> Self {
+        Self {
+            source: Source::new("", ""),
+            span: 0..0,
+        }
+    }
+}
+
 impl Source {
     /// Creates a source from its name and text.
     pub fn new(name: impl Into<Arc<str>>, text: impl Into<Arc<str>>) -> Self {

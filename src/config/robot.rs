@@ -7,6 +7,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::foreign::robot::RobotFile;
 use crate::foreign::{self, Lookup};
 use crate::paths::resolve_path;
 use crate::robot_cup::{OF_FINGERS, exclude_fingers, read_suction};
@@ -120,7 +121,7 @@ pub(crate) fn read_telling(
         .collect();
     table.expect(&usual);
     let mut found = Diagnostics::new();
-    let (urdf, lookup) = find_urdf(files, path, packages, &mut table, &mut found);
+    let (urdf, lookup) = find_urdf(files, path, packages, &mut table);
     for (key, of) in DEPENDENT {
         if let (Some(span), false) = (table.key_span(key), table.has(of)) {
             let help = if key.starts_with("suction") {
@@ -136,20 +137,13 @@ pub(crate) fn read_telling(
             );
         }
     }
+    let read = urdf
+        .as_ref()
+        .and_then(|(text, path)| foreign::robot::read(text, path, &lookup, &mut found));
     let mut roles = Roles::default();
-    let profile = read_table(
-        &mut table,
-        urdf.as_ref().map(|(urdf, _)| urdf),
-        &mut roles,
-        &mut found,
-    );
-    let mut read = None;
-    if let Some((text, path)) = &urdf {
-        let text = foreign::robot::read(text, path, &lookup, &mut found);
-        if let Some(tree) = &text.tree {
-            roles.check(tree, &mut table);
-        }
-        read = Some(text);
+    let profile = read_table(&mut table, read.as_ref(), &mut roles, &mut found);
+    if let Some(read) = &read {
+        roles.check(&read.tree, &mut table);
     }
     table.finish(&mut found);
     let warnings = found.clone();
@@ -162,9 +156,22 @@ pub(crate) fn read_telling(
             .into()
     };
     profile
-        .zip(read)
-        .map(|(profile, read)| (with_meshes(profile, read), warnings))
+        .map(|profile| (profile, warnings))
         .ok_or_else(incomplete)
+}
+
+/// Returns a profile with the links and joints of another URDF instead of its own; its meshes stay.
+/// Shapes, masses and roles are not checked.
+///
+/// # Errors
+/// Faults of the text: W031 to W036, W051, W055.
+pub fn with_urdf(profile: RobotProfile, urdf: Source) -> Result<RobotProfile, Diagnostics> {
+    let tree = foreign::robot::tree_of_urdf(&urdf)?;
+    Ok(RobotProfile {
+        urdf,
+        tree: Arc::new(tree),
+        ..profile
+    })
 }
 
 /// A URDF with moments of inertia that a body can have, where its own are impossible (W034, W036).
@@ -183,9 +190,9 @@ pub struct MendedUrdf {
 pub fn mended(files: &Files, path: &Path, packages: &[PathBuf]) -> Option<MendedUrdf> {
     let source = files.read(path).ok()?;
     let mut table = Table::parse(&source).ok()?;
-    let (urdf, lookup) = find_urdf(files, path, packages, &mut table, &mut Diagnostics::new());
+    let (urdf, lookup) = find_urdf(files, path, packages, &mut table);
     let (urdf, original) = urdf?;
-    let mut mends = foreign::robot::read(&urdf, &original, &lookup, &mut Diagnostics::new()).mends;
+    let mut mends = foreign::robot::read(&urdf, &original, &lookup, &mut Diagnostics::new())?.mends;
     if mends.is_empty() {
         return None;
     }
@@ -208,7 +215,6 @@ fn find_urdf<'a>(
     profile: &Path,
     packages: &[PathBuf],
     table: &mut Table,
-    found: &mut Diagnostics,
 ) -> (Option<(Source, PathBuf)>, Lookup<'a>) {
     let folder = profile.parent().unwrap_or(Path::new(""));
     let own = values(table.strings("package_dirs").unwrap_or_default());
@@ -242,12 +248,8 @@ fn find_urdf<'a>(
         },
     ) {
         Ok(urdf) => Some((urdf, path)),
-        Err(Unread::File(code, fault)) => {
+        Err(Unread { code, fault }) => {
             table.fault(code, written.span, fault.message, fault.help);
-            None
-        }
-        Err(Unread::Inside(faults)) => {
-            found.extend(faults);
             None
         }
     };
@@ -293,7 +295,11 @@ pub fn bare(
         .iter()
         .find_map(|argument| xacro::refusal(argument))
     {
-        return Err(Unread::File("W013", refused).faults());
+        return Err(Unread {
+            code: "W013",
+            fault: refused,
+        }
+        .faults());
     }
     let urdf = text_of(
         files,
@@ -307,12 +313,18 @@ pub fn bare(
     let mut found = Diagnostics::new();
     let read = foreign::robot::read(&urdf, path, &Lookup { files, folders }, &mut found);
     found.or(())?;
+    let incomplete = || Diagnostic::error("W010", "the robot has no links").in_source(&urdf);
+    let read = read.ok_or_else(incomplete)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let none = String::new;
     let profile = RobotProfile {
         name: name.split('.').next().unwrap_or_default().to_owned(),
-        digest: digest_of(&urdf.text),
-        urdf,
+        digest: match read.meshes.is_empty() {
+            true => digest_of(&read.text.text),
+            false => digest_of(&format!("{}{}", digest_of(&read.text.text), read.digest)),
+        },
+        urdf: read.urdf(),
+        tree: Arc::new(read.tree),
         base_joints: None,
         planar_base: false,
         mount_height_m: 0.0,
@@ -338,68 +350,50 @@ pub fn bare(
         finger_friction: FINGER_FRICTION,
         grip_force_n: GRIP_FORCE_N,
         suction: None,
-        meshes: BTreeMap::new(),
+        meshes: read.meshes,
         surfaces: BTreeMap::new(),
     };
-    Ok(with_meshes(profile, read))
+    Ok(profile)
 }
 
 /// Why a robot's file can't be read.
-enum Unread {
-    /// A fault of the whole file, with its code.
-    File(&'static str, Unexpanded),
-    /// Faults in its text.
-    Inside(Diagnostics),
+struct Unread {
+    code: &'static str,
+    fault: Unexpanded,
 }
 
 impl Unread {
     fn faults(self) -> Diagnostics {
-        match self {
-            Self::File(code, fault) => Diagnostic::error(code, fault.message)
-                .help(fault.help)
-                .into(),
-            Self::Inside(faults) => faults,
-        }
+        Diagnostic::error(self.code, self.fault.message)
+            .help(self.fault.help)
+            .into()
     }
 }
 
-/// Reads a robot's file: URDF as it is, xacro after expansion, MJCF and SDF after conversion.
+/// Returns the text of a robot's file; that of xacro after expansion.
 fn text_of(files: &Files, path: &Path, inputs: Inputs<'_>) -> Result<Source, Unread> {
     let text = files.read(path).map_err(|reason| {
         let message = format!("cannot read the URDF {}: {reason}", path.display());
-        Unread::File(
-            "W010",
-            Unexpanded {
+        Unread {
+            code: "W010",
+            fault: Unexpanded {
                 message,
                 help: "the path is relative to the profile".to_owned(),
             },
-        )
+        }
     })?;
     if xacro::is_xacro(path) {
-        return xacro::expand(path, inputs).map_err(|fault| Unread::File("W012", fault));
+        return xacro::expand(path, inputs).map_err(|fault| Unread {
+            code: "W012",
+            fault,
+        });
     }
-    match foreign::root_name(&text.text) {
-        Some("mujoco") => foreign::mjcf::to_urdf(&text, path, files).map_err(Unread::Inside),
-        Some("sdf") => foreign::sdf_robot::to_urdf(&text).map_err(Unread::Inside),
-        _ => Ok(text),
-    }
-}
-
-fn with_meshes(mut profile: RobotProfile, read: foreign::robot::RobotText) -> RobotProfile {
-    if !read.meshes.is_empty() {
-        profile.digest = digest_of(&format!("{}{}", profile.digest, read.digest));
-        profile.meshes = read.meshes;
-    }
-    if !read.edits.is_empty() {
-        let text = foreign::robot_text::with(&profile.urdf.text, read.edits);
-        profile.urdf = Source::new(Arc::clone(&profile.urdf.name), text);
-    }
-    profile
+    Ok(text)
 }
 
 fn read_table(
     table: &mut Table,
-    urdf: Option<&Source>,
+    read: Option<&RobotFile>,
     roles: &mut Roles,
     found: &mut Diagnostics,
 ) -> Option<RobotProfile> {
@@ -508,13 +502,18 @@ fn read_table(
         });
     let postures: Vec<Vec<f64>> = postures.collect();
     let (base_joints, planar_base) = base?;
-    let urdf = urdf?.clone();
+    let read = read?;
     let mut digest = Digest::new();
     digest.update(table.source().text.as_bytes());
-    digest.update(urdf.text.as_bytes());
+    digest.update(read.text.text.as_bytes());
+    let mut digest = digest.finish();
+    if !read.meshes.is_empty() {
+        digest = digest_of(&format!("{digest}{}", read.digest));
+    }
     let profile = RobotProfile {
         name,
-        urdf,
+        urdf: read.urdf(),
+        tree: Arc::new(read.tree.clone()),
         base_joints,
         planar_base,
         mount_height_m,
@@ -540,9 +539,9 @@ fn read_table(
         finger_friction,
         grip_force_n,
         suction: None,
-        meshes: BTreeMap::new(),
+        meshes: read.meshes.clone(),
         surfaces: BTreeMap::new(),
-        digest: digest.finish(),
+        digest,
     };
     Some(match suction {
         Some(cup) => profile.with_cup(cup),
@@ -646,15 +645,9 @@ mod tests {
         let mut table = Table::parse(&source).expect("it is TOML");
         let mut found = Diagnostics::new();
         assert!(
-            find_urdf(
-                &Files::Disk,
-                Path::new("no/such/r.toml"),
-                &[],
-                &mut table,
-                &mut found
-            )
-            .0
-            .is_none()
+            find_urdf(&Files::Disk, Path::new("no/such/r.toml"), &[], &mut table,)
+                .0
+                .is_none()
         );
         assert!(read_table(&mut table, None, &mut Roles::default(), &mut found).is_none());
         table.finish(&mut found);

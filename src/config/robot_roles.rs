@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::foreign::robot_tree::{Motion, Tree};
 use crate::{Located, Table};
 use actcheck_base::{Span, did_you_mean};
+use actcheck_data::{ModelTree, TreeJoint, TreeMotion};
 
 /// Tolerance at joint limits, whose values are often rounded. Unit: metres or radians.
 const SLACK: f64 = 1e-3;
@@ -26,10 +26,11 @@ impl Roles {
     /// Reports every role that its joint or link can't fill: an unknown name (W050), a joint with
     /// two roles (W052), a joint of the wrong type (W053), a position beyond the joint limits
     /// (W054).
-    pub(super) fn check(&self, tree: &Tree, table: &mut Table) {
+    pub(super) fn check(&self, tree: &ModelTree, table: &mut Table) {
         for link in self.links.iter().flatten() {
-            if !tree.links.contains(&link.value) {
-                let help = did_you_mean(&link.value, tree.links.iter().map(String::as_str));
+            if tree.link(&link.value).is_none() {
+                let known = tree.links.iter().map(|link| link.name.as_str());
+                let help = did_you_mean(&link.value, known);
                 table.fault(
                     "W050",
                     link.span.clone(),
@@ -71,17 +72,16 @@ impl Roles {
             .map_or(&[], |(_, joints)| joints)
     }
 
-    fn check_postures(&self, tree: &Tree, table: &mut Table) {
+    fn check_postures(&self, tree: &ModelTree, table: &mut Table) {
         for (span, key, positions) in &self.postures {
             for (joint, position) in self.of(key).iter().zip(positions) {
-                let Some(limits) = tree.joints.get(&joint.value) else {
+                let Some(limits) = tree.joint(&joint.value) else {
                     continue;
                 };
                 if *position < limits.lower - SLACK || *position > limits.upper + SLACK {
                     let message = format!("{position} is beyond the limits of `{}`", joint.value);
                     let radians = position.to_radians();
-                    let is_large =
-                        limits.motion == Motion::Turns && position.abs() > std::f64::consts::TAU;
+                    let is_large = turns(limits) && position.abs() > std::f64::consts::TAU;
                     let meant = is_large && (limits.lower..=limits.upper).contains(&radians);
                     let degrees = match meant {
                         true => format!(" rad; {position} degrees are {radians:.4} rad"),
@@ -99,17 +99,15 @@ impl Roles {
 
     /// Checks that two fingers that slide apart from 0 can open to `max_opening_m`. The opening of
     /// other grippers is measured by the simulation.
-    fn check_opening(&self, tree: &Tree, table: &mut Table) {
+    fn check_opening(&self, tree: &ModelTree, table: &mut Table) {
         let Some((span, opening)) = &self.opening else {
             return;
         };
         let fingers: Vec<f64> = self
             .of("finger_joints")
             .iter()
-            .filter_map(|joint| tree.joints.get(&joint.value))
-            .filter(|joint| {
-                joint.motion == Motion::Slides && joint.lower >= -SLACK && joint.upper > SLACK
-            })
+            .filter_map(|joint| tree.joint(&joint.value))
+            .filter(|joint| slides(joint) && joint.lower >= -SLACK && joint.upper > SLACK)
             .map(|joint| joint.upper)
             .collect();
         let widest = 2.0 * fingers.iter().copied().fold(f64::INFINITY, f64::min);
@@ -122,14 +120,17 @@ impl Roles {
 }
 
 /// Checks that a joint exists and has the type that its role requires.
-fn check_joint(key: &str, place: usize, joint: &Located<String>, tree: &Tree, table: &mut Table) {
+fn check_joint(
+    key: &str,
+    place: usize,
+    joint: &Located<String>,
+    tree: &ModelTree,
+    table: &mut Table,
+) {
     let name = &joint.value;
-    let Some(found) = tree.joints.get(name) else {
-        let movable = tree
-            .joints
-            .iter()
-            .filter(|(_, joint)| joint.motion != Motion::Fixed);
-        let help = did_you_mean(name, movable.map(|(name, _)| name.as_str()));
+    let Some(found) = tree.joint(name) else {
+        let movable = tree.joints.iter().filter(|joint| joint.motion.moves());
+        let help = did_you_mean(name, movable.map(|joint| joint.name.as_str()));
         table.fault(
             "W050",
             joint.span.clone(),
@@ -138,21 +139,21 @@ fn check_joint(key: &str, place: usize, joint: &Located<String>, tree: &Tree, ta
         );
         return;
     };
-    let wanted = match (key, place) {
-        ("base_joints", 0 | 1) => Some(Motion::Slides),
-        ("base_joints", _) => Some(Motion::Turns),
+    let must_slide = match (key, place) {
+        ("base_joints", 0 | 1) => Some(true),
+        ("base_joints", _) => Some(false),
         _ => None,
     };
-    let (fault, help) = match (found.motion, wanted) {
-        (Motion::Fixed, _) => (
+    let (fault, help) = match must_slide {
+        _ if !found.motion.moves() => (
             "does not move",
             "name a joint of the type prismatic, revolute or continuous",
         ),
-        (Motion::Turns, Some(Motion::Slides)) => (
+        Some(true) if turns(found) => (
             "rotates, but must be prismatic",
             "`base_joints` are x, y and heading",
         ),
-        (Motion::Slides, Some(Motion::Turns)) => (
+        Some(false) if slides(found) => (
             "is prismatic, but must be revolute or continuous",
             "`base_joints` are x, y and heading",
         ),
@@ -164,4 +165,12 @@ fn check_joint(key: &str, place: usize, joint: &Located<String>, tree: &Tree, ta
         format!("the joint `{name}` {fault}"),
         help,
     );
+}
+
+fn slides(joint: &TreeJoint) -> bool {
+    joint.motion == TreeMotion::Prismatic
+}
+
+fn turns(joint: &TreeJoint) -> bool {
+    matches!(joint.motion, TreeMotion::Revolute | TreeMotion::Continuous)
 }

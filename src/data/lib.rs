@@ -25,6 +25,8 @@ mod shape;
 mod snapshot;
 mod stream;
 mod trace;
+mod tree;
+mod tree_urdf;
 
 pub use choice_name::{ChoiceGroup, ChoiceName, OBSTACLE_LIST};
 pub use choice_parts::{ObjectAxis, PlacedObject, PlanarAxis, SightingAxis, StartAxis, WheelAxis};
@@ -51,4 +53,8 @@ pub use stream::Stream;
 pub use trace::{
     ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Form, Frames, Look, Perceived,
     PerceivedPlane, PerceivedThing, Percept, Phase, Trace,
+};
+pub use tree::{
+    Matter, ModelTree, TreeGeometry, TreeInertial, TreeJoint, TreeLink, TreeMimic, TreeMotion,
+    TreeSolid,
 };

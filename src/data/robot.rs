@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use crate::{Mesh, Part, Pose, Shape};
+use crate::{Mesh, ModelTree, Part, Pose, Shape};
 use actcheck_base::Source;
 
 /// Mass of links without a mass in the URDF, such as the stages of a base, and of lighter ones.
@@ -15,8 +15,10 @@ pub const LEAST_LINK_KG: f64 = 0.01;
 pub struct RobotProfile {
     /// Display name.
     pub name: String,
-    /// The URDF's text.
+    /// The robot in URDF, as skills receive it: the text of its file, or its tree in this form.
     pub urdf: Source,
+    /// Its links and joints, as its file states them. The simulation reads nothing else of it.
+    pub tree: Arc<ModelTree>,
     /// Joints of an omnidirectional base in the order x, y, heading; `None` if the base is fixed.
     pub base_joints: Option<[String; 3]>,
     /// Whether those joints are added below the URDF's root instead of being part of it:

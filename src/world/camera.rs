@@ -251,7 +251,11 @@ mod tests {
             .text
             .replace("<link name=\"head_camera_link\"/>", housing);
         assert_ne!(text, *profile.urdf.text);
-        profile.urdf.text = text.into();
+        profile = actcheck_config::robot::with_urdf(
+            profile,
+            actcheck_base::Source::new("housed.urdf", text),
+        )
+        .expect("it is a URDF");
         let housed = alone(profile);
         let image = open.look(&mut Choices::random(1, 0));
         assert!(

@@ -100,7 +100,9 @@ mod tests {
             )
         };
         let mut read = |effort: f64| {
-            profile.urdf = Source::new("beam.urdf", beam(effort));
+            let urdf = Source::new("beam.urdf", beam(effort));
+            profile =
+                actcheck_config::robot::with_urdf(profile.clone(), urdf).expect("it is a URDF");
             (profile.arm_joints, profile.finger_joints) = (vec!["hinge".to_owned()], Vec::new());
             RobotModel::read(&profile).expect("it is valid")
         };

@@ -1,11 +1,11 @@
-//! Converts a URDF to the simulated tree: movable links, with fixed links and those of joints
+//! Makes the simulated tree of a model's tree: movable links, with fixed links and those of joints
 //! without a role merged into them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
 
 use crate::WorldError;
 use crate::assumed::{assume_efforts, assume_speeds, widen_followers};
@@ -18,7 +18,10 @@ use crate::self_contact::LinkSolids;
 use crate::solid_depth::Material;
 use crate::surface::spread;
 use actcheck_base::did_you_mean;
-use actcheck_data::{LEAST_LINK_KG, Mesh, Part, Pose, RobotProfile, Shape, bounds};
+use actcheck_data::{
+    LEAST_LINK_KG, Mesh, ModelTree, Part, Pose, RobotProfile, Shape, TreeGeometry, TreeJoint,
+    TreeLink, TreeMotion, bounds,
+};
 
 /// The type of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -154,25 +157,20 @@ pub struct RobotModel {
 const LEAST_INERTIA: f64 = 4e-7;
 
 impl RobotModel {
-    /// Reads the robot of a profile's URDF.
+    /// Reads the robot of a profile.
     ///
     /// # Errors
-    /// [`WorldError`] if the text is not a URDF, is not a single tree, or contains unsupported
-    /// elements.
+    /// [`WorldError`] if the robot is not a single tree, or has unsupported joints.
     pub fn read(profile: &RobotProfile) -> Result<Self, WorldError> {
         let name = profile.urdf.name.to_string();
-        let robot =
-            urdf_rs::read_from_string(&profile.urdf.text).map_err(|error| WorldError::Urdf {
-                name: name.clone(),
-                reason: one_line(&error.to_string()),
-            })?;
+        let robot = &*profile.tree;
         if robot.links.is_empty() {
             return Err(WorldError::Urdf {
                 name,
                 reason: "it has no links".to_owned(),
             });
         }
-        Folding::new(&robot, name, profile)?.fold(profile)
+        Folding::new(robot, name, profile)?.fold(profile)
     }
 
     /// Returns the index of a joint by its name.
@@ -234,9 +232,9 @@ impl RobotModel {
 
 /// The state while merging a URDF's links.
 struct Folding<'a> {
-    robot: &'a urdf_rs::Robot,
-    links: BTreeMap<&'a str, &'a urdf_rs::Link>,
-    children: BTreeMap<&'a str, Vec<&'a urdf_rs::Joint>>,
+    robot: &'a ModelTree,
+    links: BTreeMap<&'a str, &'a TreeLink>,
+    children: BTreeMap<&'a str, Vec<&'a TreeJoint>>,
     /// Solids by mesh file.
     meshes: &'a BTreeMap<String, Vec<Shape>>,
     /// The meshes that they are pieces of.
@@ -246,7 +244,7 @@ struct Folding<'a> {
 
 impl<'a> Folding<'a> {
     fn new(
-        robot: &'a urdf_rs::Robot,
+        robot: &'a ModelTree,
         name: String,
         profile: &'a RobotProfile,
     ) -> Result<Self, WorldError> {
@@ -255,18 +253,18 @@ impl<'a> Folding<'a> {
             .iter()
             .map(|link| (link.name.as_str(), link))
             .collect();
-        let mut children: BTreeMap<&str, Vec<&urdf_rs::Joint>> = BTreeMap::new();
+        let mut children: BTreeMap<&str, Vec<&TreeJoint>> = BTreeMap::new();
         let mut parents: BTreeMap<&str, &str> = BTreeMap::new();
         for joint in &robot.joints {
             if parents
-                .insert(joint.child.link.as_str(), joint.parent.link.as_str())
+                .insert(joint.child.as_str(), joint.parent.as_str())
                 .is_some()
             {
-                let reason = format!("the link `{}` has two parents", joint.child.link);
+                let reason = format!("the link `{}` has two parents", joint.child);
                 return Err(WorldError::Urdf { name, reason });
             }
             children
-                .entry(joint.parent.link.as_str())
+                .entry(joint.parent.as_str())
                 .or_default()
                 .push(joint);
         }
@@ -278,7 +276,7 @@ impl<'a> Folding<'a> {
             floats: robot
                 .joints
                 .iter()
-                .any(|joint| joint.joint_type == urdf_rs::JointType::Floating),
+                .any(|joint| joint.motion == TreeMotion::Floating),
             own_leaders: BTreeMap::new(),
             passing: BTreeSet::new(),
             rigid: Vec::new(),
@@ -298,12 +296,7 @@ impl<'a> Folding<'a> {
     }
 
     fn fold(mut self, profile: &RobotProfile) -> Result<RobotModel, WorldError> {
-        let is_child = |name: &str| {
-            self.robot
-                .joints
-                .iter()
-                .any(|joint| joint.child.link == name)
-        };
+        let is_child = |name: &str| self.robot.joints.iter().any(|joint| joint.child == name);
         let roots: Vec<&str> = self
             .robot
             .links
@@ -343,22 +336,22 @@ impl<'a> Folding<'a> {
                 .into_iter()
                 .rev()
             {
-                let origin = at * isometry(&joint.origin);
+                let origin = at * joint.origin;
                 if is_rigid(joint) {
-                    open.push((&joint.child.link, into, origin));
+                    open.push((&joint.child, into, origin));
                 } else if !needed.contains(joint) {
                     let rigid = self.movable(joint, into, origin)?;
                     self.out.rigid.push(joint.name.clone());
                     open.push((
-                        &joint.child.link,
+                        &joint.child,
                         into,
                         origin * motion(&rigid, needed.rest(joint)),
                     ));
                 } else {
                     self.out.joints.push(self.movable(joint, into, origin)?);
-                    self.out.links.push(empty_link(&joint.child.link));
+                    self.out.links.push(empty_link(&joint.child));
                     open.push((
-                        &joint.child.link,
+                        &joint.child,
                         self.out.links.len() - 1,
                         Isometry3::identity(),
                     ));
@@ -367,8 +360,11 @@ impl<'a> Folding<'a> {
         }
         self.resolve_mimics(&needed)?;
         let link = |name: &str| self.out.frames.get(name).map(|(link, _)| *link);
-        let pairs = disabled_collisions(&profile.urdf.text)
-            .filter_map(|[a, b]| Some((link(&a)?, link(&b)?)));
+        let pairs = self
+            .robot
+            .passing
+            .iter()
+            .filter_map(|[a, b]| Some((link(a)?, link(b)?)));
         self.out.passing = pairs
             .filter(|(a, b)| a != b)
             .map(|(a, b)| (a.min(b), a.max(b)))
@@ -434,20 +430,23 @@ impl<'a> Folding<'a> {
                 reason,
             });
         };
-        let inertial = at * isometry(&source.inertial.origin);
-        let added = Mass {
-            mass: source.inertial.mass.value,
-            com: inertial.translation.vector,
-            inertia: {
+        let added = match &source.inertial {
+            None => Mass::NONE,
+            Some(stated) => {
+                let inertial = at * stated.pose;
                 let turned = inertial.rotation.to_rotation_matrix();
-                turned.matrix() * matrix(&source.inertial.inertia) * turned.matrix().transpose()
-            },
+                Mass {
+                    mass: stated.kg,
+                    com: inertial.translation.vector,
+                    inertia: turned.matrix() * stated.about_com * turned.matrix().transpose(),
+                }
+            }
         };
         let mut solids: Vec<Part> = Vec::new();
         let mut materials = Vec::new();
         let before = self.out.links[into].solids.len();
-        for collision in source.collision.iter().filter(|_| has_shapes) {
-            let origin = at * isometry(&collision.origin);
+        for collision in source.solids.iter().filter(|_| has_shapes) {
+            let origin = at * collision.pose;
             let pose = Pose::from_isometry(&origin);
             let shapes = self.shapes(&collision.geometry, name)?;
             let first = before + solids.len();
@@ -478,61 +477,46 @@ impl<'a> Folding<'a> {
     }
 
     /// Returns the solids of a collision geometry: a primitive, or the pieces of a mesh.
-    fn shapes(&self, geometry: &urdf_rs::Geometry, link: &str) -> Result<Vec<Shape>, WorldError> {
-        Ok(match geometry {
-            urdf_rs::Geometry::Box { size } => vec![Shape::Box { size: size.0 }],
-            urdf_rs::Geometry::Cylinder { radius, length } => {
-                vec![Shape::Cylinder {
-                    radius: *radius,
-                    height: *length,
-                }]
-            }
-            urdf_rs::Geometry::Sphere { radius } => vec![Shape::Sphere { radius: *radius }],
-            urdf_rs::Geometry::Capsule { radius, length } => vec![Shape::Capsule {
-                radius: *radius,
-                height: *length,
-            }],
-            urdf_rs::Geometry::Mesh { filename, scale } => {
-                let scale = scale.map_or([1.0; 3], |scale| scale.0);
-                let solids = self
-                    .meshes
-                    .get(filename)
-                    .ok_or_else(|| WorldError::Unsupported {
-                        name: self.out.name.clone(),
-                        what: format!("the mesh {filename} of `{link}`, which was not loaded,"),
-                    })?;
-                solids.iter().map(|solid| solid.scaled(scale)).collect()
-            }
-        })
+    fn shapes(&self, geometry: &TreeGeometry, link: &str) -> Result<Vec<Shape>, WorldError> {
+        let TreeGeometry::Mesh { file, scale } = geometry else {
+            return Ok(geometry.solid().into_iter().collect());
+        };
+        let solids = self
+            .meshes
+            .get(file)
+            .ok_or_else(|| WorldError::Unsupported {
+                name: self.out.name.clone(),
+                what: format!("the mesh {file} of `{link}`, which was not loaded,"),
+            })?;
+        Ok(solids.iter().map(|solid| solid.scaled(*scale)).collect())
     }
 
     /// Returns the mesh of a collision geometry, as its file has it; `None` for a primitive.
-    fn material(&self, geometry: &urdf_rs::Geometry, origin: Isometry3<f64>) -> Option<Material> {
-        let urdf_rs::Geometry::Mesh { filename, scale } = geometry else {
+    fn material(&self, geometry: &TreeGeometry, origin: Isometry3<f64>) -> Option<Material> {
+        let TreeGeometry::Mesh { file, scale } = geometry else {
             return None;
         };
-        let scale = scale.map_or([1.0; 3], |scale| scale.0);
-        let mesh = match self.surfaces.get(filename).map(Vec::as_slice) {
+        let mesh = match self.surfaces.get(file).map(Vec::as_slice) {
             Some([only]) => Arc::clone(only),
             Some(several) => Arc::new(joined(several)),
             // Not yet divided.
-            None => match self.meshes.get(filename)?.first()? {
+            None => match self.meshes.get(file)?.first()? {
                 Shape::Mesh { mesh } => Arc::new(mesh.clone()),
                 _ => return None,
             },
         };
-        Some(Material::new(mesh, scale, origin))
+        Some(Material::new(mesh, *scale, origin))
     }
 
     fn movable(
         &self,
-        joint: &urdf_rs::Joint,
+        joint: &TreeJoint,
         parent: usize,
         origin: Isometry3<f64>,
     ) -> Result<Joint, WorldError> {
-        let kind = match joint.joint_type {
-            urdf_rs::JointType::Prismatic => JointKind::Prismatic,
-            urdf_rs::JointType::Revolute | urdf_rs::JointType::Continuous => JointKind::Revolute,
+        let kind = match joint.motion {
+            TreeMotion::Prismatic => JointKind::Prismatic,
+            TreeMotion::Revolute | TreeMotion::Continuous => JointKind::Revolute,
             _ => {
                 let what = format!("the type of joint `{}`", joint.name);
                 return Err(WorldError::Unsupported {
@@ -541,38 +525,27 @@ impl<'a> Folding<'a> {
                 });
             }
         };
-        let limited = joint.joint_type != urdf_rs::JointType::Continuous;
-        let damping = joint
-            .dynamics
-            .as_ref()
-            .map_or(0.0, |dynamics| dynamics.damping);
-        let (lower, upper) = if limited {
-            (joint.limit.lower, joint.limit.upper)
-        } else {
-            (f64::NEG_INFINITY, f64::INFINITY)
-        };
         Ok(Joint {
             name: joint.name.clone(),
             kind,
             parent,
             origin,
-            axis: Unit::try_new(Vector3::from(joint.axis.xyz.0), 1e-9).unwrap_or(Vector3::x_axis()),
-            lower,
-            upper,
-            effort: joint.limit.effort,
-            velocity: reachable(joint.limit.velocity, joint.limit.effort, damping),
-            damping,
+            axis: Unit::try_new(joint.axis, 1e-9).unwrap_or(Vector3::x_axis()),
+            lower: joint.lower,
+            upper: joint.upper,
+            effort: joint.effort,
+            velocity: reachable(joint.velocity, joint.effort, joint.damping),
+            damping: joint.damping,
             mimic: None,
         })
     }
 
     fn resolve_mimics(&mut self, needed: &Needed<'_>) -> Result<(), WorldError> {
-        let moves = |joint: &&urdf_rs::Joint| !is_rigid(joint) && needed.contains(joint);
+        let moves = |joint: &&TreeJoint| !is_rigid(joint) && needed.contains(joint);
         for joint in self.robot.joints.iter().filter(moves) {
             let Some(mimic) = &joint.mimic else { continue };
-            let (follower, leader) = (self.out.joint(&joint.name)?, self.out.joint(&mimic.joint)?);
-            let (factor, offset) = (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));
-            self.out.joints[follower].mimic = Some((leader, factor, offset));
+            let (follower, leader) = (self.out.joint(&joint.name)?, self.out.joint(&mimic.leader)?);
+            self.out.joints[follower].mimic = Some((leader, mimic.factor, mimic.offset));
         }
         // Each follows the joint at the end of its chain: the engine closes one coupling better
         // than two.
@@ -602,37 +575,6 @@ fn joined(meshes: &[Arc<Mesh>]) -> Mesh {
         );
     }
     all
-}
-
-/// The pairs of links in the `<disable_collisions>` of a text: an element of SRDF, which the URDF
-/// of a converted robot has.
-fn disabled_collisions(text: &str) -> impl Iterator<Item = [String; 2]> + '_ {
-    text.split("<disable_collisions ")
-        .skip(1)
-        .filter_map(|element| {
-            let element = element.split('>').next()?;
-            let attribute = |name: &str| {
-                let value = element
-                    .split(name)
-                    .nth(1)?
-                    .trim_start()
-                    .strip_prefix('=')?
-                    .trim_start();
-                let quote = value
-                    .chars()
-                    .next()
-                    .filter(|mark| ['"', '\''].contains(mark))?;
-                let value = value[1..].split(quote).next()?;
-                Some(
-                    value
-                        .replace("&quot;", "\"")
-                        .replace("&lt;", "<")
-                        .replace("&gt;", ">")
-                        .replace("&amp;", "&"),
-                )
-            };
-            Some([attribute("link1")?, attribute("link2")?])
-        })
 }
 
 /// Density of links without `<inertial>`: that of water. Unit: kg/m³.
@@ -667,6 +609,12 @@ struct Mass {
 }
 
 impl Mass {
+    const NONE: Self = Self {
+        mass: 0.0,
+        com: Vector3::new(0.0, 0.0, 0.0),
+        inertia: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    };
+
     fn plus(&self, other: &Self) -> Self {
         let mass = self.mass + other.mass;
         if mass <= 0.0 {
@@ -704,30 +652,12 @@ fn empty_link(name: &str) -> Link {
     }
 }
 
-fn isometry(pose: &urdf_rs::Pose) -> Isometry3<f64> {
-    let [roll, pitch, yaw] = pose.rpy.0;
-    Isometry3::from_parts(
-        Translation3::from(Vector3::from(pose.xyz.0)),
-        UnitQuaternion::from_euler_angles(roll, pitch, yaw),
-    )
-}
-
-fn matrix(i: &urdf_rs::Inertia) -> Matrix3<f64> {
-    Matrix3::new(
-        i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz,
-    )
-}
-
-fn one_line(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
 /// Whether a joint does not move: it is fixed, or moves the whole robot over the floor, which a
 /// profile's `base` does.
-fn is_rigid(joint: &urdf_rs::Joint) -> bool {
+fn is_rigid(joint: &TreeJoint) -> bool {
     matches!(
-        joint.joint_type,
-        urdf_rs::JointType::Fixed | urdf_rs::JointType::Planar | urdf_rs::JointType::Floating
+        joint.motion,
+        TreeMotion::Fixed | TreeMotion::Planar | TreeMotion::Floating
     )
 }
 

@@ -63,12 +63,9 @@ mod tests {
         assert!(profile.urdf.text.contains(link));
         let piece =
             "<collision><geometry><box size=\"0.02 0.02 0.02\"/></geometry></collision>".repeat(4);
-        profile.urdf.text = profile
-            .urdf
-            .text
-            .replace(link, &format!("{link}{piece}"))
-            .into();
-        alone(profile)
+        let text = profile.urdf.text.replace(link, &format!("{link}{piece}"));
+        let urdf = actcheck_base::Source::new("pieces.urdf", text);
+        alone(actcheck_config::robot::with_urdf(profile, urdf).expect("it is a URDF"))
     }
 
     /// Returns the names of the links whose shapes are in the search.

@@ -238,7 +238,8 @@ mod tests {
                 .text
                 .replace("<link name=\"base\"/>", &block)
                 .replace("<link name=\"palm\">", palm);
-            profile.urdf = Source::new("hand.urdf", text);
+            profile = actcheck_config::robot::with_urdf(profile, Source::new("hand.urdf", text))
+                .expect("it is a URDF");
             let mut world = alone(profile);
             let links = world.robot.model.links.iter();
             let names: Vec<&str> = links.map(|link| link.name.as_str()).collect();

@@ -112,7 +112,8 @@ mod tests {
                 "<mimic joint=\"driver\" multiplier=\"-0.5\"/>"
             ),
         );
-        profile.urdf = Source::new("linkage.urdf", text);
+        profile = actcheck_config::robot::with_urdf(profile, Source::new("linkage.urdf", text))
+            .expect("it is a URDF");
         profile.arm_joints = Vec::new();
         profile.base_joints = None;
         let model = RobotModel::read(&profile).expect("it is a URDF");

@@ -5,20 +5,20 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use actcheck_data::RobotProfile;
+use actcheck_data::{ModelTree, RobotProfile, TreeJoint, TreeMotion};
 
 /// The movable joints of a robot, and the positions of the others.
 pub(super) struct Needed<'a> {
     /// `None` if the profile has no roles yet: all joints move, but those that it parks.
     moving: Option<BTreeSet<&'a str>>,
-    joints: BTreeMap<&'a str, &'a urdf_rs::Joint>,
+    joints: BTreeMap<&'a str, &'a TreeJoint>,
     /// Positions of rigid joints that the profile gives.
     parked: BTreeMap<&'a str, f64>,
 }
 
 impl<'a> Needed<'a> {
-    pub(super) fn of(robot: &'a urdf_rs::Robot, profile: &'a RobotProfile) -> Self {
-        let joints: BTreeMap<&str, &urdf_rs::Joint> = robot
+    pub(super) fn of(robot: &'a ModelTree, profile: &'a RobotProfile) -> Self {
+        let joints: BTreeMap<&str, &TreeJoint> = robot
             .joints
             .iter()
             .map(|joint| (joint.name.as_str(), joint))
@@ -50,7 +50,7 @@ impl<'a> Needed<'a> {
             let n_known = moving.len();
             for joint in &robot.joints {
                 if let Some(mimic) = &joint.mimic {
-                    let pair = [joint.name.as_str(), mimic.joint.as_str()];
+                    let pair = [joint.name.as_str(), mimic.leader.as_str()];
                     if pair.iter().any(|name| moving.contains(name)) {
                         moving.extend(pair);
                     }
@@ -73,11 +73,11 @@ impl<'a> Needed<'a> {
     }
 
     /// Whether the simulation moves a joint. A coupling with the factor 0 holds it where it is.
-    pub(super) fn contains(&self, joint: &urdf_rs::Joint) -> bool {
+    pub(super) fn contains(&self, joint: &TreeJoint) -> bool {
         let is_held = joint
             .mimic
             .as_ref()
-            .is_some_and(|mimic| mimic.multiplier == Some(0.0));
+            .is_some_and(|mimic| mimic.factor == 0.0);
         let name = joint.name.as_str();
         !is_held
             && self
@@ -90,17 +90,17 @@ impl<'a> Needed<'a> {
 
     /// The position of a rigid joint: that of the profile, otherwise 0 or the limit nearest to it;
     /// by its coupling if it has one.
-    pub(super) fn rest(&self, joint: &urdf_rs::Joint) -> f64 {
+    pub(super) fn rest(&self, joint: &TreeJoint) -> f64 {
         let mut at = joint;
         let (mut factor, mut offset) = (1.0, 0.0);
         // A chain of couplings that is longer than this is a circle.
         for _ in 0..self.joints.len() {
             let Some(mimic) = &at.mimic else { break };
-            let Some(leader) = self.joints.get(mimic.joint.as_str()) else {
+            let Some(leader) = self.joints.get(mimic.leader.as_str()) else {
                 break;
             };
-            offset += factor * mimic.offset.unwrap_or(0.0);
-            factor *= mimic.multiplier.unwrap_or(1.0);
+            offset += factor * mimic.offset;
+            factor *= mimic.factor;
             at = leader;
         }
         let parked = self.parked.get(at.name.as_str()).copied().unwrap_or(0.0);
@@ -109,12 +109,12 @@ impl<'a> Needed<'a> {
 }
 
 /// The position nearest to this one within the limits of a joint.
-fn within(joint: &urdf_rs::Joint, position: f64) -> f64 {
-    let unlimited = joint.joint_type == urdf_rs::JointType::Continuous;
-    let is_range = joint.limit.lower <= joint.limit.upper;
+fn within(joint: &TreeJoint, position: f64) -> f64 {
+    let unlimited = joint.motion == TreeMotion::Continuous;
+    let is_range = joint.lower <= joint.upper;
     if unlimited || !is_range {
         position
     } else {
-        position.clamp(joint.limit.lower, joint.limit.upper)
+        position.clamp(joint.lower, joint.upper)
     }
 }

@@ -600,7 +600,7 @@ pub(super) mod tests {
     #[test]
     fn joints_with_strong_friction_keep_up_with_their_targets() {
         let with_friction = |damping: f64| {
-            let mut profile = lonely().robot.profile.as_ref().clone();
+            let profile = lonely().robot.profile.as_ref().clone();
             let limit = r#"effort="50" velocity="1.5"/>"#;
             let (before, after) = profile
                 .urdf
@@ -608,8 +608,9 @@ pub(super) mod tests {
                 .split_once(limit)
                 .expect("the shipped robot has such a joint");
             let after = after.replacen(r#"damping="0.5""#, &format!("damping=\"{damping}\""), 1);
-            profile.urdf.text = format!("{before}{limit}{after}").into();
-            alone(profile)
+            let text = format!("{before}{limit}{after}");
+            let urdf = actcheck_base::Source::new("slow.urdf", text);
+            alone(actcheck_config::robot::with_urdf(profile, urdf).expect("it is a URDF"))
         };
         let find = |world: &World| {
             let joints = world.kinematics().joints();
@@ -671,10 +672,10 @@ pub(super) mod tests {
             (refused.code, refused.help.as_deref()),
             ("W021", Some("did you mean `arm_flex_joint`?"))
         );
-        profile.urdf.text = "<robot".into();
+        profile.tree = Arc::default();
         assert_eq!(
             check_robot(&profile)
-                .expect_err("it is not a URDF")
+                .expect_err("it has no links")
                 .diagnostic()
                 .code,
             "W020"

@@ -96,13 +96,12 @@ mod tests {
         );
         assert_ne!(text, *profile.urdf.text);
         let name = std::sync::Arc::clone(&profile.urdf.name);
-        profile.urdf = Source::new(
-            name,
-            text.replace(
-                "radius=\"0.045\" length=\"0.18\"",
-                "radius=\"0.1\" length=\"0.2\"",
-            ),
+        let text = text.replace(
+            "radius=\"0.045\" length=\"0.18\"",
+            "radius=\"0.1\" length=\"0.2\"",
         );
+        profile = actcheck_config::robot::with_urdf(profile, Source::new(name, text))
+            .expect("it is a URDF");
         let model = RobotModel::read(&profile).expect("it is valid");
         let names =
             |pair: &(usize, usize)| [pair.0, pair.1].map(|link| model.links[link].name.clone());

@@ -4,12 +4,13 @@
 use std::collections::VecDeque;
 
 use crate::foreign::body::{Body, MovingBody};
-use crate::foreign::xml::{Node, Reader};
+use crate::foreign::xml;
+use actcheck_base::{Diagnostic, Diagnostics, SourceSpan};
 use actcheck_data::PartJoint;
 
 /// A joint between two links, by their indices.
-pub(crate) struct Join<'a> {
-    pub(crate) node: Node<'a>,
+pub(crate) struct Join {
+    pub(crate) place: SourceSpan,
     pub(crate) parent: usize,
     pub(crate) child: usize,
     /// `None` if it is fixed.
@@ -18,24 +19,24 @@ pub(crate) struct Join<'a> {
 
 /// The body of each link, and the joint that moves each body. Body 0 is the object itself; each of
 /// the others comes after the one that carries it.
-pub(crate) struct Assembly<'a> {
+pub(crate) struct Assembly {
     bodies: Vec<usize>,
-    moved: Vec<Moved<'a>>,
+    moved: Vec<Moved>,
 }
 
 /// A body that a joint moves.
-struct Moved<'a> {
-    node: Node<'a>,
+struct Moved {
+    place: SourceSpan,
     carrier: usize,
     /// A link of it.
     link: usize,
     joint: PartJoint,
 }
 
-impl<'a> Assembly<'a> {
+impl Assembly {
     /// Finds the bodies of links. Reports W035 if two joints move one body or joints form a cycle;
     /// then all links are one.
-    pub(crate) fn of(n_links: usize, joins: &[Join<'a>], reader: &mut Reader) -> Self {
+    pub(crate) fn of(n_links: usize, joins: &[Join], found: &mut Diagnostics) -> Self {
         let rigid = Self {
             bodies: vec![0; n_links],
             moved: Vec::new(),
@@ -48,7 +49,7 @@ impl<'a> Assembly<'a> {
                 .filter(|group| **group == from)
                 .for_each(|group| *group = to);
         }
-        let moving: Vec<(&Join<'a>, PartJoint)> = joins
+        let moving: Vec<(&Join, PartJoint)> = joins
             .iter()
             .filter_map(|join| join.joint.map(|joint| (join, joint)))
             .collect();
@@ -60,13 +61,9 @@ impl<'a> Assembly<'a> {
         };
         for (join, _) in &moving {
             if movers(groups[join.child]) > 1 {
-                let message = "two joints move the same links".to_owned();
-                reader.error(
-                    "W035",
-                    join.node,
-                    message,
-                    "links form one tree: remove one of the joints",
-                );
+                let message = "two joints move the same links";
+                let help = "links form one tree: remove one of the joints";
+                found.push(fault(Diagnostic::error("W035", message), &join.place, help));
                 return rigid;
             }
         }
@@ -75,13 +72,13 @@ impl<'a> Assembly<'a> {
             .iter()
             .map(|group| (movers(*group) == 0).then_some(0))
             .collect();
-        let (mut moved, mut left): (Vec<Moved<'a>>, VecDeque<_>) =
+        let (mut moved, mut left): (Vec<Moved>, VecDeque<_>) =
             (Vec::new(), moving.iter().collect());
         let mut tries = left.len();
         while let Some(next @ (join, joint)) = left.pop_front() {
             if let Some(carrier) = bodies[join.parent] {
                 moved.push(Moved {
-                    node: join.node,
+                    place: join.place.clone(),
                     carrier,
                     link: join.child,
                     joint: *joint,
@@ -95,12 +92,8 @@ impl<'a> Assembly<'a> {
                 tries -= 1;
                 left.push_back(next);
             } else {
-                reader.error(
-                    "W035",
-                    join.node,
-                    "the joints form a cycle".to_owned(),
-                    "links form one tree",
-                );
+                let error = Diagnostic::error("W035", "the joints form a cycle");
+                found.push(fault(error, &join.place, "links form one tree"));
                 return rigid;
             }
         }
@@ -126,7 +119,12 @@ impl<'a> Assembly<'a> {
 
     /// Attaches the bodies that joints move to the first. `names` are those of the links. A body
     /// without shapes is left out with a warning (W036), or refused if it carries others (W035).
-    pub(crate) fn attach(&self, bodies: Vec<Body>, names: &[&str], reader: &mut Reader) -> Body {
+    pub(crate) fn attach(
+        &self,
+        bodies: Vec<Body>,
+        names: &[&str],
+        found: &mut Diagnostics,
+    ) -> Body {
         let mut bodies = bodies.into_iter();
         let mut whole = bodies.next().unwrap_or_default();
         // The part that each body became.
@@ -136,19 +134,19 @@ impl<'a> Assembly<'a> {
             if body.parts.is_empty() {
                 let message = format!("the link `{link}` has no `<collision>`");
                 if self.moved.iter().any(|other| other.carrier == idx + 1) {
-                    reader.error(
-                        "W035",
-                        moved.node,
-                        message,
-                        "a link that a joint moves and that carries others needs one",
-                    );
+                    let help = "a link that a joint moves and that carries others needs one";
+                    found.push(fault(
+                        Diagnostic::error("W035", message),
+                        &moved.place,
+                        help,
+                    ));
                 } else {
-                    reader.warning(
-                        "W036",
-                        moved.node,
-                        message,
-                        "the model works without the link",
-                    );
+                    let help = "the model works without the link";
+                    found.push(fault(
+                        Diagnostic::warning("W036", message),
+                        &moved.place,
+                        help,
+                    ));
                 }
                 parts.push(None);
                 continue;
@@ -164,6 +162,10 @@ impl<'a> Assembly<'a> {
         }
         whole
     }
+}
+
+fn fault(fault: Diagnostic, at: &SourceSpan, help: &str) -> Diagnostic {
+    fault.at(&at.source, xml::tag(at)).help(help)
 }
 
 /// Returns a name for a part: letters and digits of that of its link, with a number if it is taken.

@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 use nalgebra::Isometry3;
 
 use crate::foreign::footprint::turned;
+use crate::foreign::geometry::Shapes;
 use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::nested::Role;
 use crate::foreign::sdf::SdfModel;
-use crate::foreign::urdf::{Materials, Shapeless};
 use crate::foreign::xml::{self, Node, Reader};
-use crate::foreign::{mjcf, sdf, urdf};
-use actcheck_base::{Diagnostic, Diagnostics, FileFault, Files, Severity, did_you_mean};
+use crate::foreign::{mjcf, sdf, tree_object, urdf};
+use actcheck_base::{Diagnostic, Diagnostics, FileFault, Files, Severity, Source, did_you_mean};
 use actcheck_data::ObjectModel;
 
 /// A model found in a folder.
@@ -102,17 +102,41 @@ fn read_sdf_model(
         .read(&path)
         .map_err(|reason| unreadable(&path, &reason))?;
     let (model, said) = match path.extension().and_then(|ending| ending.to_str()) {
-        Some("urdf") => {
-            let materials = Materials::default();
-            urdf::read(&source, &path, lookup, &materials, Shapeless::Urdf)
-        }
-        Some("xml") if is_mjcf(lookup.files, &path) => {
-            let (urdf, materials) = mjcf::object(&source, &path, lookup.files)?;
-            urdf::read(&urdf, &path, lookup, &materials, Shapeless::Mjcf(&source))
-        }
+        Some("urdf") => urdf::read(&source, &path, lookup),
+        Some("xml") if is_mjcf(lookup.files, &path) => read_mjcf(&source, &path, lookup)?,
         _ => sdf::read(&source, &path, lookup, role, depth),
     };
     model.map(|model| (model, said.clone())).ok_or(said)
+}
+
+/// Reads an object in MJCF and its faults. The object is `None` if there are errors.
+///
+/// # Errors
+/// Faults of its text.
+fn read_mjcf(
+    source: &Source,
+    path: &Path,
+    lookup: &Lookup,
+) -> Result<(Option<SdfModel>, Diagnostics), Diagnostics> {
+    let (tree, text, mut said) = mjcf::object(source, path, lookup)?;
+    let mut shapes = Shapes::new(lookup, path);
+    shapes.digest.update(text.text.as_bytes());
+    let (model, found) = tree_object::read(&tree, &mut shapes);
+    said.extend(found);
+    if model
+        .as_ref()
+        .is_some_and(|model| model.body.parts.is_empty())
+    {
+        let message = "the object has no solid shape: none of its geoms collides";
+        let help = "set `contype` and `conaffinity` of a geom to 1; a geom for which both are 0 is only seen";
+        said.push(
+            Diagnostic::error("W038", message)
+                .at(source, 0..0)
+                .help(help),
+        );
+        return Ok((None, said));
+    }
+    Ok((model, said))
 }
 
 /// Returns the name of the model that a URI means: the path in a model folder, or the last part of

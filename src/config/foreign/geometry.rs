@@ -1,13 +1,14 @@
 //! Shapes in SDF and URDF.
 
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::path::Path;
 
 use crate::foreign::lookup::Lookup;
 use crate::foreign::mesh_file;
 use crate::foreign::xml::{self, Bound, Node, Reader};
-use actcheck_base::{Diagnostic, Diagnostics, Digest};
-use actcheck_data::{Mesh, Shape};
+use actcheck_base::{Diagnostic, Diagnostics, Digest, SourceSpan};
+use actcheck_data::{Mesh, ModelTree, Shape, TreeGeometry, TreeSolid};
 
 /// Reads the shapes of one file.
 pub(crate) struct Shapes<'a> {
@@ -21,7 +22,7 @@ pub(crate) struct Shapes<'a> {
 }
 
 /// Help text with the supported kinds of geometry.
-const KINDS: &str = "use a box, cylinder, sphere, capsule, cone, ellipsoid or mesh";
+pub(crate) const KINDS: &str = "use a box, cylinder, sphere, capsule, cone, ellipsoid or mesh";
 
 impl<'a> Shapes<'a> {
     pub(crate) fn new(lookup: &'a Lookup<'a>, path: &'a Path) -> Self {
@@ -91,58 +92,85 @@ impl<'a> Shapes<'a> {
         scale: [f64; 3],
         reader: &mut Reader,
     ) -> Option<Shape> {
+        let place = reader.place(node);
+        self.mesh_at(&place, uri, scale, &mut reader.found)
+    }
+
+    /// Reads a mesh that is named at a place. Returns `None` after it has reported a fault there.
+    pub(crate) fn mesh_at(
+        &mut self,
+        place: &SourceSpan,
+        uri: &str,
+        scale: [f64; 3],
+        found: &mut Diagnostics,
+    ) -> Option<Shape> {
+        let at_place = |fault: Diagnostic| fault.at(&place.source, xml::tag(place));
         if scale.contains(&0.0) {
-            reader.error(
-                "W034",
-                node,
-                "the mesh's scale must not be 0".to_owned(),
-                "write 1 for the file's own size",
-            );
+            let fault = Diagnostic::error("W034", "the mesh's scale must not be 0");
+            found.push(at_place(fault).help("write 1 for the file's own size"));
             return None;
         }
-        match self.mesh_file(uri) {
-            Ok(file) => {
-                self.digest.update(&file.bytes);
-                reader.found.extend(file.warnings);
-                let mesh = file.mesh.scaled(scale);
-                let longest = mesh
-                    .vertices
-                    .iter()
-                    .flatten()
-                    .fold(0.0_f64, |most, along| most.max(along.abs()));
-                if longest > xml::LONGEST {
-                    let message = format!(
-                        "the mesh reaches {longest:.0} m from its origin, which is beyond {} m",
-                        xml::LONGEST
-                    );
-                    reader.error(
-                        "W034",
-                        node,
-                        message,
-                        "lengths are in metres: write `scale` 0.001 for millimetres",
-                    );
-                    return None;
-                }
-                // With the backs of its faces, a mesh has no volume.
-                let mesh = if mesh.volume() > LEAST_VOLUME {
-                    mesh
-                } else {
-                    mesh.one_sided()
-                };
-                Some(Shape::Mesh { mesh })
-            }
+        let file = match self.mesh_file(uri) {
+            Ok(file) => file,
             Err(faults) => {
                 // A fault without a source, as of a binary mesh file, is reported where the file is
                 // named.
                 let placed = |fault: Diagnostic| match fault.source {
-                    None => fault.at(reader.source, xml::span(node)),
+                    None => at_place(fault),
                     Some(_) => fault,
                 };
-                let faults: Diagnostics = faults.into_iter().map(placed).collect();
-                reader.found.extend(faults);
-                None
+                found.extend(faults.into_iter().map(placed).collect());
+                return None;
             }
+        };
+        self.digest.update(&file.bytes);
+        found.extend(file.warnings);
+        let mesh = file.mesh.scaled(scale);
+        let longest = mesh
+            .vertices
+            .iter()
+            .flatten()
+            .fold(0.0_f64, |most, along| most.max(along.abs()));
+        if longest > xml::LONGEST {
+            let message = format!(
+                "the mesh reaches {longest:.0} m from its origin, which is beyond {} m",
+                xml::LONGEST
+            );
+            let help = "lengths are in metres: write `scale` 0.001 for millimetres";
+            found.push(at_place(Diagnostic::error("W034", message)).help(help));
+            return None;
         }
+        // With the backs of its faces, a mesh has no volume.
+        let mesh = if mesh.volume() > LEAST_VOLUME {
+            mesh
+        } else {
+            mesh.one_sided()
+        };
+        Some(Shape::Mesh { mesh })
+    }
+
+    /// Reads the mesh of a solid of a tree, if it has one that is not known yet.
+    pub(crate) fn load(
+        &mut self,
+        solid: &TreeSolid,
+        tree: &ModelTree,
+        meshes: &mut BTreeMap<String, Vec<Shape>>,
+        found: &mut Diagnostics,
+    ) {
+        let TreeGeometry::Mesh { file, .. } = &solid.geometry else {
+            return;
+        };
+        if meshes.contains_key(file) {
+            return;
+        }
+        let shape = match tree.inline_meshes.get(file) {
+            Some(mesh) => {
+                self.digest.update(mesh.digest().as_bytes());
+                Some(Shape::Mesh { mesh: mesh.clone() })
+            }
+            None => self.mesh_at(&solid.place, file, [1.0; 3], found),
+        };
+        meshes.extend(shape.map(|shape| (file.clone(), vec![shape])));
     }
 
     fn mesh_file(&self, uri: &str) -> Result<mesh_file::MeshFile, Diagnostics> {
@@ -155,7 +183,7 @@ impl<'a> Shapes<'a> {
 }
 
 /// Returns the element that determines the kind of a geometry.
-fn kind_of<'n>(geometry: Node<'n>, reader: &mut Reader) -> Option<Node<'n>> {
+pub(crate) fn kind_of<'n>(geometry: Node<'n>, reader: &mut Reader) -> Option<Node<'n>> {
     let kind = geometry.children().find(Node::is_element);
     if kind.is_none() {
         reader.error("W033", geometry, "`<geometry>` is empty".to_owned(), KINDS);
@@ -283,16 +311,21 @@ const LEAST_VOLUME: f64 = 1e-12;
 
 /// Reports W037 if the shape of a `<collision>` is a mesh without a volume.
 pub(crate) fn check_volume(shape: &Shape, collision: Node, reader: &mut Reader) {
+    let place = reader.place(collision);
+    report_volume(shape, &place, &mut reader.found);
+}
+
+/// Reports W037 at a place if a shape is a mesh without a volume.
+pub(crate) fn report_volume(shape: &Shape, place: &SourceSpan, found: &mut Diagnostics) {
     let Shape::Mesh { mesh } = shape else { return };
     if mesh.volume() > LEAST_VOLUME {
         return;
     }
-    let message = "the mesh has no volume".to_owned();
-    reader.error(
-        "W037",
-        collision,
-        message,
-        "a collision mesh must be a closed surface; use a thin box for a sheet",
+    let error = Diagnostic::error("W037", "the mesh has no volume");
+    found.push(
+        error
+            .at(&place.source, xml::tag(place))
+            .help("a collision mesh must be a closed surface; use a thin box for a sheet"),
     );
 }
 

@@ -1,5 +1,5 @@
-//! Converts a robot or an object in MJCF, MuJoCo's format, to URDF: bodies, joints, geoms,
-//! inertias, equalities of joints.
+//! Reads a robot or an object in MJCF, MuJoCo's format: bodies, joints, geoms, inertias, equalities
+//! of joints.
 //!
 //! Sites and cameras become links, so that a profile can name them. Spatial tendons and options are
 //! not read.
@@ -10,20 +10,17 @@ use std::rc::Rc;
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
-use crate::foreign::mjcf_compiler::{Attributes, Compiler};
+use crate::foreign::lookup::Lookup;
+use crate::foreign::mjcf_compiler::{Attributes, Compiler, Item, Whole, with_includes};
 use crate::foreign::mjcf_couplings::{Couplings, elements};
-use crate::foreign::mjcf_materials::{Mask, collides};
-use crate::foreign::urdf::Materials;
-use crate::foreign::urdf_text::{Inertial, UrdfJoint, UrdfText};
+use crate::foreign::mjcf_masks::{Mask, collides};
+use crate::foreign::solid_mass::{self, SolidMass};
 use crate::foreign::xml::{self, Bound, Node, Reader};
-use actcheck_base::{Diagnostics, Source};
+use actcheck_base::{Diagnostics, Source, SourceSpan};
+use actcheck_data::{
+    Mesh, ModelTree, TreeInertial, TreeJoint, TreeLink, TreeMimic, TreeMotion, TreeSolid,
+};
 
-/// Density of geoms: MuJoCo's default. Unit: kg/m³.
-pub(super) const DENSITY: f64 = 1000.0;
-/// Mass of a body with neither a mass nor a shape whose volume is known. Unit: kilograms.
-const UNKNOWN_KG: f64 = 0.1;
-/// Edge of the cube whose inertia such a body gets. Unit: metres.
-const UNKNOWN_M: f64 = 0.05;
 /// Largest effort of a joint without limits of its actuator. Units: newtons or newton metres.
 const EFFORT: f64 = 100.0;
 /// Largest velocity of joints, which MJCF does not have. Units: rad/s and m/s.
@@ -32,92 +29,107 @@ const VELOCITY: [f64; 2] = [2.0, 0.5];
 const MOST_BODIES: usize = 1_000;
 /// Range of an unlimited sliding joint. Unit: metres.
 const SLIDES_M: f64 = 10.0;
+/// Deepest attachment of models to others: deeper ones attach themselves.
+const DEEPEST: usize = 8;
 
-/// Converts the text of a robot.
+/// A tree, its text with all included files, and warnings.
+pub(crate) type Read = (ModelTree, Source, Diagnostics);
+
+/// Reads a robot.
 ///
 /// # Errors
-/// Faults of the text: W031 to W036, W055.
-pub(crate) fn to_urdf(
-    source: &Source,
-    path: &Path,
-    files: &actcheck_base::Files,
-) -> Result<Source, Diagnostics> {
-    converted(source, path, files, None).map(|(urdf, _)| urdf)
+/// Faults of the text: W031 to W036, W051, W055.
+pub(crate) fn robot(source: &Source, path: &Path, lookup: &Lookup) -> Result<Read, Diagnostics> {
+    whole(source, path, lookup, Purpose::Robot, 0)
 }
 
-/// Converts the text of an object. Also returns the mass of bodies without `<inertial>`, which URDF
-/// can't state.
+/// Reads an object: its joints without a name of their own move its parts, and it moves freely
+/// whatever the file says.
 ///
 /// # Errors
-/// Faults of the text: W031 to W036, W055.
-pub(crate) fn object(
-    source: &Source,
-    path: &Path,
-    files: &actcheck_base::Files,
-) -> Result<(Source, Materials), Diagnostics> {
-    let (urdf, materials) = converted(source, path, files, Some(Materials::default()))?;
-    Ok((urdf, materials.unwrap_or_default()))
+/// As [`robot`].
+pub(crate) fn object(source: &Source, path: &Path, lookup: &Lookup) -> Result<Read, Diagnostics> {
+    whole(source, path, lookup, Purpose::Object, 0)
 }
 
-fn converted(
+/// The use of a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Purpose {
+    Robot,
+    Object,
+}
+
+fn whole(
     source: &Source,
     path: &Path,
-    files: &actcheck_base::Files,
-    materials: Option<Materials>,
-) -> Result<(Source, Option<Materials>), Diagnostics> {
-    with_robot(source, path, files, |root, mut robot, reader| {
-        robot.materials = materials;
-        let world = robot.unique("world");
-        robot.out.link(&world, None, &[]);
-        match xml::child(root, "worldbody") {
-            Some(worldbody) => {
-                robot.children(worldbody, &world, &Isometry3::identity(), None, reader)
+    lookup: &Lookup,
+    purpose: Purpose,
+    depth: usize,
+) -> Result<Read, Diagnostics> {
+    with_model(
+        source,
+        path,
+        lookup,
+        (purpose, depth),
+        |root, mut model, reader| {
+            let world = model.unique("world");
+            model.link(TreeLink::frame(world.clone(), reader.place(root)));
+            if xml::child(root, "worldbody").is_none() {
+                reader.error(
+                    "W033",
+                    root,
+                    "`<mujoco>` has no `<worldbody>`".to_owned(),
+                    "add the bodies",
+                );
             }
-            None => reader.error(
-                "W033",
-                root,
-                "`<mujoco>` has no `<worldbody>`".to_owned(),
-                "add the bodies",
-            ),
-        }
-        if robot.materials.is_none() {
-            robot.write_passing(root);
-        }
-        let name = root.attribute("model").unwrap_or("robot").to_owned();
-        (
-            Source::new(
-                format!("{} (as URDF)", source.name),
-                robot.out.finish(&name),
-            ),
-            robot.materials,
-        )
-    })
+            for worldbody in xml::children(root, "worldbody") {
+                model.worldbody(worldbody, &world, reader);
+            }
+            if purpose == Purpose::Robot {
+                model.add_passing(root);
+            }
+            model.weigh(reader);
+            model.tree.name = root.attribute("model").unwrap_or("robot").to_owned();
+            model.tree
+        },
+    )
 }
 
-/// Reads the settings of a text, and calls `read` with its root and a robot without bodies.
-pub(super) fn with_robot<T>(
+/// Reads the settings of a text, and calls `read` with its root and a model without bodies. Returns
+/// what that returns, the text with all included files, and warnings.
+pub(super) fn with_model<T>(
     source: &Source,
     path: &Path,
-    files: &actcheck_base::Files,
-    read: impl FnOnce(Node, Robot, &mut Reader) -> T,
-) -> Result<T, Diagnostics> {
-    let text = crate::foreign::mjcf_compiler::with_includes(source, path, files, 0)?;
-    let source = &Source::new(source.name.to_string(), text);
-    let document = xml::parse_model(source, &source.text)?;
+    lookup: &Lookup,
+    (purpose, depth): (Purpose, usize),
+    read: impl FnOnce(Node, Model, &mut Reader) -> T,
+) -> Result<(T, Source, Diagnostics), Diagnostics> {
+    let Whole { source, pieces } = with_includes(source, path, lookup.files)?;
+    let document = xml::parse_model(&source, &source.text)?;
     let root = document.root_element();
-    let mut reader = Reader::new(source);
+    let mut reader = Reader::new(&source);
+    reader.pieces = pieces;
     let compiler = Compiler::read(root, &mut reader);
-    let robot = Robot {
-        out: UrdfText::default(),
+    let model = Model {
+        tree: ModelTree::default(),
         couplings: Rc::new(Couplings::read(root, &compiler, &mut reader)),
         compiler: Rc::new(compiler),
         names: BTreeMap::new(),
         joint_names: BTreeMap::new(),
         masks: BTreeMap::new(),
-        materials: None,
+        purpose,
+        file: File {
+            path,
+            lookup,
+            depth,
+        },
     };
-    let found = read(root, robot, &mut reader);
-    reader.found.or(found)
+    let read = read(root, model, &mut reader);
+    let said = reader.found;
+    if said.has_errors() {
+        return Err(said);
+    }
+    Ok((read, source, said))
 }
 
 /// A name that no other has.
@@ -131,8 +143,18 @@ pub(super) fn unique(names: &mut BTreeMap<String, u32>, name: &str) -> String {
     }
 }
 
-pub(super) struct Robot {
-    pub(super) out: UrdfText,
+/// The file of a model.
+#[derive(Clone, Copy)]
+pub(super) struct File<'a> {
+    pub(super) path: &'a Path,
+    pub(super) lookup: &'a Lookup<'a>,
+    /// Number of models that it is attached to.
+    depth: usize,
+}
+
+/// A model being read.
+pub(super) struct Model<'a> {
+    pub(super) tree: ModelTree,
     pub(super) compiler: Rc<Compiler>,
     couplings: Rc<Couplings>,
     /// Names of links in use, each with the number of its copies.
@@ -141,33 +163,50 @@ pub(super) struct Robot {
     joint_names: BTreeMap<String, u32>,
     /// The masks of each body's colliding geoms.
     masks: BTreeMap<String, BTreeSet<Mask>>,
-    /// Of an object; `None` for a robot.
-    pub(super) materials: Option<Materials>,
+    purpose: Purpose,
+    pub(super) file: File<'a>,
 }
 
-impl Robot {
+impl Model<'_> {
     /// A name that no other link has.
     pub(super) fn unique(&mut self, name: &str) -> String {
         unique(&mut self.names, name)
     }
 
-    /// Another one of the same file, without bodies, for an object.
+    /// Another one of the same file, without bodies.
     pub(super) fn alone(&self) -> Self {
         Self {
-            out: UrdfText::default(),
+            tree: ModelTree::default(),
             compiler: Rc::clone(&self.compiler),
             couplings: Rc::clone(&self.couplings),
             names: BTreeMap::new(),
             joint_names: BTreeMap::new(),
             masks: BTreeMap::new(),
-            materials: Some(Materials::default()),
+            ..*self
         }
     }
 
-    /// Writes the pairs of bodies that pass through each other: those that `<exclude>` names, and
+    pub(super) fn link(&mut self, link: TreeLink) {
+        self.tree.links.push(link);
+    }
+
+    /// Keeps a mesh that the file itself contains.
+    pub(super) fn keep_mesh(&mut self, name: &str, mesh: Mesh) {
+        self.tree.inline_meshes.insert(name.to_owned(), mesh);
+    }
+
+    /// Adds a link without mass and shapes, fixed to another at a pose in its frame.
+    fn frame(&mut self, name: &str, parent: &str, pose: Isometry3<f64>, place: SourceSpan) {
+        let own = unique(&mut self.joint_names, &format!("{name}_fixed"));
+        self.link(TreeLink::frame(name.to_owned(), place.clone()));
+        let joint = TreeJoint::fixed(own, [parent, name], pose, place);
+        self.tree.joints.push(joint);
+    }
+
+    /// Adds the pairs of bodies that pass through each other: those that `<exclude>` names, and
     /// those whose geoms never collide with each other.
-    fn write_passing(&mut self, root: Node) {
-        let mut passing = BTreeSet::new();
+    fn add_passing(&mut self, root: Node) {
+        let mut passing: BTreeSet<[&str; 2]> = BTreeSet::new();
         let excludes = elements(root, "contact").filter(|contact| contact.has_tag_name("exclude"));
         for exclude in excludes {
             if let (Some(first), Some(second)) =
@@ -197,100 +236,212 @@ impl Robot {
                 }
             }
         }
-        for pair in passing
+        let known = passing
             .into_iter()
             .filter(|pair| pair.iter().all(|body| self.names.contains_key(*body)))
-        {
-            self.out.passing(pair);
-        }
+            .map(|pair| pair.map(str::to_owned));
+        self.tree.passing.extend(known);
     }
 
-    /// Writes the bodies, sites and cameras in a body. `shift` is the body's frame in the frame of
+    /// Adds the bodies of a world, and its solids, which are fixed.
+    fn worldbody(&mut self, worldbody: Node, world: &str, reader: &mut Reader) {
+        let compiler = Rc::clone(&self.compiler);
+        let content = compiler.content(worldbody, worldbody.attribute("childclass"), reader);
+        let [solids, visuals] = self.geoms(&content, &Isometry3::identity(), reader);
+        if let Some(link) = self.tree.links.iter_mut().find(|link| link.name == world) {
+            link.solids.extend(solids);
+            link.visuals.extend(visuals);
+        }
+        self.children(&content, world, &Isometry3::identity(), reader);
+    }
+
+    /// Adds the bodies, sites and cameras in a body. `shift` is the body's frame in the frame of
     /// its link.
     fn children(
         &mut self,
-        node: Node,
+        content: &[Item<'_>],
         link: &str,
         shift: &Isometry3<f64>,
-        class: Option<&str>,
         reader: &mut Reader,
     ) {
-        for child in node.children().filter(Node::is_element) {
-            match child.tag_name().name() {
-                "body" => self.body(child, link, shift, class, reader),
-                "frame" => {
-                    let pose =
-                        self.compiler
-                            .pose(&self.compiler.attributes(child, class), child, reader);
-                    let class = child.attribute("childclass").or(class);
-                    self.children(child, link, &(shift * pose), class, reader);
-                }
+        let compiler = Rc::clone(&self.compiler);
+        for item in content {
+            let Item { node, class, .. } = *item;
+            let shift = shift * item.shift;
+            match node.tag_name().name() {
+                "body" => self.body(item, link, &shift, reader),
                 "site" | "camera" => {
-                    let Some(name) = child.attribute("name") else {
-                        continue;
-                    };
-                    let pose =
-                        self.compiler
-                            .pose(&self.compiler.attributes(child, class), child, reader);
-                    let turned = if child.tag_name().name() == "camera" {
+                    let Some(name) = item.name() else { continue };
+                    let pose = compiler.pose(&compiler.attributes(node, class), node, reader);
+                    let turned = if item.is("camera") {
                         lens()
                     } else {
                         Isometry3::identity()
                     };
-                    let name = self.unique(name);
-                    self.out.frame(&name, link, shift * pose * turned);
+                    let name = self.unique(&name);
+                    self.frame(&name, link, shift * pose * turned, reader.place(node));
                 }
-                "attach" | "replicate" => {
-                    let message = format!(
-                        "the bodies that `<{}>` adds are not read",
-                        child.tag_name().name()
-                    );
-                    let help = "let MuJoCo write one file with all of them: \
-                                `mujoco.MjSpec.from_file(FILE)`, then `compile()` and `to_xml()`";
-                    reader.error("W035", child, message, help);
+                "attach" => self.attach(item, link, &shift, reader),
+                "composite" | "flexcomp" => {
+                    let name = node.tag_name().name();
+                    let message = format!("`<{name}>` can't be simulated: its bodies are soft");
+                    let help = "leave it out, or replace it by bodies that are rigid";
+                    reader.error("W035", node, message, help);
                 }
                 _ => {}
             }
         }
     }
 
+    /// Adds a body of another file.
+    fn attach(&mut self, item: &Item<'_>, link: &str, shift: &Isometry3<f64>, reader: &mut Reader) {
+        let node = item.node;
+        let help = "or let MuJoCo write one file with all bodies: \
+                    `mujoco.MjSpec.from_file(FILE)`, then `compile()` and `to_xml()`";
+        let mut refused = |message: String| reader.error("W035", node, message, help);
+        let name = node.attribute("model").unwrap_or_default();
+        let Some(file) = self.compiler.models.get(name) else {
+            return refused(format!(
+                "`<asset>` has no `<model name=\"{name}\" file=\"…\"/>` to attach"
+            ));
+        };
+        let folder = self.file.path.parent().unwrap_or(Path::new(""));
+        let path = folder.join(file);
+        if self.file.depth >= DEEPEST {
+            return refused(format!(
+                "`{file}` is attached {DEEPEST} models deep: it may attach itself"
+            ));
+        }
+        let source = match self.file.lookup.files.read(&path) {
+            Ok(source) => source,
+            Err(reason) => return refused(format!("cannot read {}: {reason}", path.display())),
+        };
+        let read = whole(
+            &source,
+            &path,
+            self.file.lookup,
+            self.purpose,
+            self.file.depth + 1,
+        );
+        let tree = match read {
+            Ok((tree, _, said)) => {
+                reader.found.extend(said);
+                tree
+            }
+            Err(faults) => return reader.found.extend(faults),
+        };
+        let prefix = format!(
+            "{}{}",
+            node.attribute("prefix").unwrap_or_default(),
+            item.suffix
+        );
+        let pose = {
+            let attributes = self.compiler.attributes(node, item.class);
+            shift * self.compiler.pose(&attributes, node, reader)
+        };
+        let body = node.attribute("body");
+        let folder = file.rsplit_once('/').map_or("", |(folder, _)| folder);
+        let graft = Graft {
+            prefix: &prefix,
+            folder,
+            body,
+        };
+        match graft.of(tree) {
+            Some(tree) => self.graft(tree, link, &pose),
+            None => refused_body(node, body.unwrap_or_default(), &path, reader),
+        }
+    }
+
+    /// Adds a tree to a link. Its root is dropped.
+    fn graft(&mut self, tree: ModelTree, link: &str, pose: &Isometry3<f64>) {
+        let mut links = tree.links.into_iter();
+        let root = links.next();
+        let root_name = root.as_ref().map(|root| root.name.clone());
+        if let (Some(root), Some(own)) = (
+            root,
+            self.tree.links.iter_mut().find(|own| own.name == link),
+        ) {
+            let moved = |solid: TreeSolid| TreeSolid {
+                pose: pose * solid.pose,
+                ..solid
+            };
+            own.solids.extend(root.solids.into_iter().map(moved));
+            own.visuals.extend(root.visuals.into_iter().map(moved));
+        }
+        for joint in tree.joints {
+            unique(&mut self.joint_names, &joint.name);
+            let is_first = Some(&joint.parent) == root_name.as_ref();
+            self.tree.joints.push(if is_first {
+                TreeJoint {
+                    parent: link.to_owned(),
+                    origin: pose * joint.origin,
+                    ..joint
+                }
+            } else {
+                joint
+            });
+        }
+        for other in links {
+            self.unique(&other.name);
+            self.link(other);
+        }
+        self.tree.passing.extend(tree.passing);
+        self.tree.inline_meshes.extend(tree.inline_meshes);
+    }
+
     pub(super) fn body(
         &mut self,
-        body: Node,
+        item: &Item<'_>,
         parent: &str,
         shift: &Isometry3<f64>,
-        class: Option<&str>,
         reader: &mut Reader,
     ) {
         let compiler = Rc::clone(&self.compiler);
-        let class = body.attribute("childclass").or(class);
-        let name = self.unique(body.attribute("name").unwrap_or("body"));
-        let attributes = compiler.attributes(body, class);
+        let body = item.node;
+        let class = body.attribute("childclass").or(item.class);
+        let place = reader.place(body);
+        let name = item.name().unwrap_or_else(|| "body".to_owned());
+        let name = self.unique(&name);
+        let attributes = compiler.attributes(body, item.class);
         let mut at = shift * compiler.pose(&attributes, body, reader);
+        let content = compiler.content(body, class, reader);
+        let inside: Vec<Item<'_>> = content
+            .into_iter()
+            .map(|inner| Item {
+                suffix: format!("{}{}", inner.suffix, item.suffix),
+                ..inner
+            })
+            .collect();
         // A body that moves freely is the whole robot or object.
-        let is_free = |joint: &Node| compiler.attributes(*joint, class).get("type") == Some("free");
-        let joints: Vec<Node> = xml::children(body, "joint")
-            .filter(|joint| !is_free(joint))
+        let is_free = |joint: &&Item| {
+            joint.is("freejoint")
+                || joint.is("joint")
+                    && compiler.attributes(joint.node, joint.class).get("type") == Some("free")
+        };
+        let joints: Vec<&Item> = inside
+            .iter()
+            .filter(|joint| joint.is("joint") && !is_free(joint))
             .collect();
         let mut from = parent.to_owned();
         // Position of the body's origin in the frame of its link.
         let mut own = Isometry3::identity();
         for (idx, joint) in joints.iter().enumerate() {
-            let attributes = compiler.attributes(*joint, class);
+            let attributes = compiler.attributes(joint.node, joint.class);
             let anchor = attributes
                 .get("pos")
-                .and_then(|text| reader.numbers(*joint, text, Bound::Finite));
-            let anchor = Translation3::from(Vector3::from(anchor.unwrap_or([0.0; 3])));
+                .and_then(|text| reader.numbers::<3>(joint.node, text, Bound::Finite));
+            let anchor = joint.shift * nalgebra::Point3::from(anchor.unwrap_or([0.0; 3]));
+            let anchor = Translation3::from(anchor.coords);
             let link = if idx + 1 == joints.len() {
                 name.clone()
             } else {
                 self.unique(&format!("{name}_{}", idx + 1))
             };
             if idx + 1 < joints.len() {
-                self.out.link(&link, None, &[]);
+                self.link(TreeLink::frame(link.clone(), reader.place(joint.node)));
             }
             if self
-                .joint(*joint, &attributes, (&from, &link), at * anchor, reader)
+                .joint(joint, &attributes, [&from, &link], at * anchor, reader)
                 .is_some()
             {
                 (from, own) = (
@@ -301,54 +452,57 @@ impl Robot {
             }
         }
         if joints.is_empty() {
-            let free = xml::child(body, "freejoint").is_some()
-                || xml::children(body, "joint").any(|joint| is_free(&joint));
-            let (kind, ending) = if free && self.materials.is_none() {
-                ("floating", "free")
+            let free = inside.iter().any(|joint| is_free(&joint));
+            let (motion, ending) = if free && self.purpose == Purpose::Robot {
+                (TreeMotion::Floating, "free")
             } else {
-                ("fixed", "fixed")
+                (TreeMotion::Fixed, "fixed")
             };
             let own = unique(&mut self.joint_names, &format!("{name}_{ending}"));
-            self.out.joint(&UrdfJoint {
-                kind,
-                ..UrdfJoint::fixed(&own, parent, &name, at)
+            self.tree.joints.push(TreeJoint {
+                motion,
+                ..TreeJoint::fixed(own, [parent, &name], at, place.clone())
             });
         }
-        let solids = self.solids(body, &own, class, reader);
-        if self.materials.is_none() {
-            let geoms = xml::children(body, "geom").map(|geom| compiler.attributes(geom, class));
-            self.masks.insert(
-                name.clone(),
-                geoms.filter(collides).map(|geom| Mask::of(&geom)).collect(),
-            );
+        let [solids, visuals] = self.geoms(&inside, &own, reader);
+        if self.purpose == Purpose::Robot {
+            let geoms = inside
+                .iter()
+                .filter(|geom| geom.is("geom"))
+                .map(|geom| compiler.attributes(geom.node, geom.class));
+            let masks = geoms
+                .filter(|geom| collides(geom, &compiler))
+                .map(|geom| Mask::of(&geom));
+            self.masks.insert(name.clone(), masks.collect());
         }
-        let inertial = match &mut self.materials {
-            Some(materials) if xml::child(body, "inertial").is_none() => {
-                materials.add(&name, body, &compiler, class);
-                None
-            }
-            _ => Some(self.inertial(body, &own, class, &solids, reader)),
-        };
-        let solids: Vec<(Isometry3<f64>, String)> = solids
-            .into_iter()
-            .map(|(pose, shape, _)| (pose, shape))
-            .collect();
-        self.out.link(&name, inertial.as_ref(), &solids);
-        self.children(body, &name, &own, class, reader);
+        let stated = inside
+            .iter()
+            .find(|inner| inner.is("inertial"))
+            .filter(|_| compiler.masses.from_geoms != Some(true));
+        let inertial = stated.and_then(|inner| inertial(inner, &own, &compiler, reader));
+        self.link(TreeLink {
+            name: name.clone(),
+            inertial,
+            solids,
+            visuals,
+            place,
+        });
+        self.children(&inside, &name, &own, reader);
     }
 
-    /// Writes a joint. Returns `None` after it has reported a fault.
+    /// Adds a joint. Returns `None` after it has reported a fault.
     fn joint(
         &mut self,
-        joint: Node,
+        item: &Item<'_>,
         attributes: &Attributes<'_>,
-        (parent, child): (&str, &str),
+        [parent, child]: [&str; 2],
         origin: Isometry3<f64>,
         reader: &mut Reader,
     ) -> Option<()> {
-        let (kind, slides) = match attributes.get("type").unwrap_or("hinge") {
-            "hinge" => ("revolute", false),
-            "slide" => ("prismatic", true),
+        let joint = item.node;
+        let (motion, slides) = match attributes.get("type").unwrap_or("hinge") {
+            "hinge" => (TreeMotion::Revolute, false),
+            "slide" => (TreeMotion::Prismatic, true),
             other => {
                 let message = format!("a joint of the type {other} can't be simulated");
                 reader.error(
@@ -360,14 +514,73 @@ impl Robot {
                 return None;
             }
         };
-        let name = joint
-            .attribute("name")
-            .map_or_else(|| format!("{child}_joint"), str::to_owned);
+        let name = item.name().unwrap_or_else(|| format!("{child}_joint"));
         let axis = attributes
             .get("axis")
             .map_or(Some([0.0, 0.0, 1.0]), |text| {
                 reader.numbers(joint, text, Bound::Finite)
             })?;
+        let axis = item.shift.rotation * Vector3::from(axis);
+        let Some(direction) = Unit::try_new(axis, 1e-9) else {
+            let message = format!("the axis of the joint `{name}` must not be zero");
+            reader.error(
+                "W034",
+                joint,
+                message,
+                "write, for example, `axis=\"0 0 1\"`",
+            );
+            return None;
+        };
+        let range = self.range(joint, attributes, &name, slides, reader)?;
+        let (motion, [lower, upper]) = match (range, slides) {
+            (Some(range), _) => (motion, range),
+            (None, true) => (motion, [-SLIDES_M, SLIDES_M]),
+            (None, false) => (TreeMotion::Continuous, [f64::NEG_INFINITY, f64::INFINITY]),
+        };
+        let start = self.couplings.start(&name);
+        let origin = match start {
+            0.0 => origin,
+            _ if slides => origin * Translation3::from(direction.scale(-start)),
+            _ => origin * UnitQuaternion::from_axis_angle(&direction, -start),
+        };
+        let place = reader.place(joint);
+        let mimic = self.couplings.mimics.get(&name).cloned();
+        let effort = self.effort(joint, attributes, &name, reader);
+        let unique = unique(&mut self.joint_names, &name);
+        self.tree.joints.push(TreeJoint {
+            motion,
+            axis,
+            lower,
+            upper,
+            effort,
+            velocity: VELOCITY[usize::from(slides)],
+            damping: attributes.number("damping").unwrap_or(0.0),
+            // Robots overcome it with their motors.
+            friction: attributes
+                .number("frictionloss")
+                .filter(|_| self.purpose == Purpose::Object)
+                .unwrap_or(0.0),
+            mimic: mimic.map(|(leader, factor, offset)| TreeMimic {
+                leader,
+                factor,
+                offset,
+                place: place.clone(),
+            }),
+            ..TreeJoint::fixed(unique, [parent, child], origin, place)
+        });
+        Some(())
+    }
+
+    /// Returns the limits of a joint: its own, otherwise those of its position servo, if it has
+    /// any. Returns `None` after it has reported a fault.
+    fn range(
+        &self,
+        joint: Node,
+        attributes: &Attributes<'_>,
+        name: &str,
+        slides: bool,
+        reader: &mut Reader,
+    ) -> Option<Option<[f64; 2]>> {
         let range = match attributes.get("range") {
             Some(text) => Some(reader.numbers::<2>(joint, text, Bound::Finite)?),
             None => None,
@@ -390,118 +603,222 @@ impl Robot {
             _ => range.is_some(),
         };
         let unit = if slides { 1.0 } else { self.compiler.angle };
-        let range = range
+        let own = range
             .filter(|_| limited)
             .map(|range| range.map(|end| end * unit));
-        let (kind, range) = match (range.or(self.couplings.ranges.get(&name).copied()), slides) {
-            (Some(range), _) => (kind, range),
-            (None, true) => (kind, [-SLIDES_M, SLIDES_M]),
-            (None, false) => ("continuous", [0.0; 2]),
-        };
-        let start = self.couplings.start(&name);
-        let origin = match Unit::try_new(Vector3::from(axis), 1e-9).filter(|_| start != 0.0) {
-            Some(axis) if slides => origin * Translation3::from(axis.scale(-start)),
-            Some(axis) => origin * UnitQuaternion::from_axis_angle(&axis, -start),
-            None => origin,
-        };
-        let damping = attributes
-            .get("damping")
-            .and_then(|text| text.split_whitespace().next()?.parse().ok());
-        let friction = attributes
-            .get("frictionloss")
-            .and_then(|text| text.parse().ok());
-        let own_effort = attributes
+        Some(own.or(self.couplings.ranges.get(name).copied()))
+    }
+
+    /// Returns the largest effort of a joint: that of its actuators, but at most its own limit.
+    fn effort(
+        &self,
+        joint: Node,
+        attributes: &Attributes<'_>,
+        name: &str,
+        reader: &mut Reader,
+    ) -> f64 {
+        let own = attributes
             .get("actuatorfrcrange")
-            .and_then(|text| reader.numbers::<2>(joint, text, Bound::Finite));
-        let effort = own_effort
-            .map(|[lower, upper]| f64::max(-lower, upper))
-            .or_else(|| self.couplings.efforts.get(&name).copied());
-        let unstated = if self.couplings.is_passive(&name) {
+            .filter(|_| attributes.get("actuatorfrclimited") != Some("false"))
+            .and_then(|text| reader.numbers::<2>(joint, text, Bound::Finite))
+            .map(|[lower, upper]| f64::max(-lower, upper));
+        let of_actuators = self.couplings.efforts.get(name).copied();
+        let effort = [own, of_actuators]
+            .into_iter()
+            .flatten()
+            .filter(|effort| *effort > 0.0)
+            .reduce(f64::min);
+        let unstated = if self.couplings.is_passive(name) {
             0.0
         } else {
             EFFORT
         };
-        let unique = unique(&mut self.joint_names, &name);
-        self.out.joint(&UrdfJoint {
-            name: &unique,
-            kind,
-            parent,
-            child,
-            origin,
-            axis: Vector3::from(axis),
-            range,
-            effort: effort.filter(|effort| *effort > 0.0).unwrap_or(unstated),
-            velocity: VELOCITY[usize::from(slides)],
-            damping: damping.unwrap_or(0.0),
-            // Robots overcome it with their motors.
-            friction: friction.filter(|_| self.materials.is_some()).unwrap_or(0.0),
-            mimic: self.couplings.mimics.get(&name).cloned(),
-        });
-        Some(())
+        effort.unwrap_or(unstated)
     }
 
-    /// The inertia of a body: stated, or that of its geoms as points with the inertia of small
-    /// cubes.
-    fn inertial(
-        &self,
-        body: Node,
-        own: &Isometry3<f64>,
-        class: Option<&str>,
-        solids: &[(Isometry3<f64>, String, Option<f64>)],
-        reader: &mut Reader,
-    ) -> Inertial {
-        let stated = xml::child(body, "inertial").and_then(|node| {
-            let attributes = self.compiler.attributes(node, class);
-            let pose = own * self.compiler.pose(&attributes, node, reader);
-            let [kg] = reader.numbers::<1>(node, attributes.get("mass")?, Bound::Mass)?;
-            let about_com =
-                match (attributes.get("fullinertia"), attributes.get("diaginertia")) {
-                    (Some(text), _) => {
-                        let [xx, yy, zz, xy, xz, yz] = reader.numbers(node, text, Bound::Finite)?;
-                        Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
-                    }
-                    (None, Some(text)) => Matrix3::from_diagonal(&Vector3::from(
-                        reader.numbers::<3>(node, text, Bound::Finite)?,
-                    )),
-                    (None, None) => cube(kg),
-                };
-            Some(Inertial {
-                pose,
-                kg,
-                about_com,
-            })
-        });
-        if let Some(stated) = stated {
-            return stated;
+    /// Gives each link without a stated mass that of its geoms, and applies the rules of
+    /// `<compiler>` to all masses.
+    pub(super) fn weigh(&mut self, reader: &mut Reader) {
+        let mut meshes = BTreeMap::new();
+        let mut shapes = self.shapes();
+        let tree = &self.tree;
+        for link in tree.links.iter().filter(|link| link.inertial.is_none()) {
+            let geoms = link.solids.iter().chain(&link.visuals);
+            for geom in geoms.filter(|geom| geom.matter.is_some()) {
+                shapes.load(geom, tree, &mut meshes, &mut reader.found);
+            }
         }
-        let parts: Vec<(Vector3<f64>, f64)> = solids
-            .iter()
-            .filter_map(|(pose, _, kg)| Some((pose.translation.vector, kg.filter(|kg| *kg > 0.0)?)))
-            .collect();
-        let kg: f64 = parts.iter().map(|(_, kg)| kg).sum();
-        if kg <= 0.0 {
-            return Inertial {
-                pose: *own,
-                kg: UNKNOWN_KG,
-                about_com: cube(UNKNOWN_KG),
-            };
+        let rules = Rc::clone(&self.compiler);
+        for link in &mut self.tree.links {
+            if link.inertial.is_none() {
+                let geoms = link.solids.iter().chain(&link.visuals);
+                let SolidMass { kg, com, about_com } = solid_mass::together(geoms, &meshes);
+                link.inertial = (kg > 0.0).then(|| TreeInertial {
+                    pose: Isometry3::translation(com.x, com.y, com.z),
+                    kg,
+                    about_com,
+                    place: link.place.clone(),
+                    moments_place: None,
+                });
+            }
+            if let Some(inertial) = &mut link.inertial {
+                rules.masses.apply(inertial);
+            }
         }
-        let com = parts.iter().map(|(at, kg)| at * *kg).sum::<Vector3<f64>>() / kg;
-        let of_point = |(at, kg): &(Vector3<f64>, f64)| {
-            let d = at - com;
-            (Matrix3::identity() * d.norm_squared() - d * d.transpose()) * *kg + cube(*kg)
+        let inertials = || {
+            self.tree
+                .links
+                .iter()
+                .filter_map(|link| link.inertial.as_ref())
         };
-        Inertial {
-            pose: Isometry3::translation(com.x, com.y, com.z),
-            kg,
-            about_com: parts.iter().map(of_point).sum(),
+        let total: f64 = inertials().map(|inertial| inertial.kg).sum();
+        if let Some(wanted) = rules.masses.total_kg.filter(|_| total > 0.0) {
+            let links = self.tree.links.iter_mut();
+            for inertial in links.filter_map(|link| link.inertial.as_mut()) {
+                inertial.kg *= wanted / total;
+                inertial.about_com *= wanted / total;
+            }
         }
     }
 }
 
-/// The inertia of a cube of this mass.
-fn cube(kg: f64) -> Matrix3<f64> {
-    Matrix3::identity() * (kg * UNKNOWN_M * UNKNOWN_M / 6.0)
+fn refused_body(node: Node, body: &str, path: &Path, reader: &mut Reader) {
+    let message = format!("{} has no body `{body}` to attach", path.display());
+    reader.error(
+        "W035",
+        node,
+        message,
+        "name one of its bodies, or leave out `body`",
+    );
+}
+
+/// The part of a tree that is attached to another, with new names.
+struct Graft<'a> {
+    prefix: &'a str,
+    /// Folder of its file, relative to that of the other.
+    folder: &'a str,
+    /// The body whose subtree is taken; `None` for all.
+    body: Option<&'a str>,
+}
+
+impl Graft<'_> {
+    /// Returns the part below its root; `None` if there is no such body.
+    fn of(&self, mut tree: ModelTree) -> Option<ModelTree> {
+        let root = tree.links.first()?.name.clone();
+        if let Some(body) = self.body {
+            let mut kept = BTreeSet::from([body.to_owned()]);
+            // The links between a body's joints are its own.
+            let mut above = body.to_owned();
+            while let Some(joint) = tree.joints.iter().find(|joint| joint.child == above)
+                && joint.parent != root
+                && joint.parent.starts_with(&format!("{body}_"))
+            {
+                above.clone_from(&joint.parent);
+                kept.insert(above.clone());
+            }
+            for joint in &mut tree.joints {
+                if joint.child == above {
+                    joint.parent.clone_from(&root);
+                }
+            }
+            loop {
+                let n_known = kept.len();
+                let below = tree
+                    .joints
+                    .iter()
+                    .filter(|joint| kept.contains(&joint.parent));
+                let below: Vec<String> = below.map(|joint| joint.child.clone()).collect();
+                kept.extend(below);
+                if kept.len() == n_known {
+                    break;
+                }
+            }
+            tree.link(body)?;
+            tree.joints.retain(|joint| kept.contains(&joint.child));
+            tree.links
+                .retain(|link| link.name == root || kept.contains(&link.name));
+            if let Some(world) = tree.links.first_mut() {
+                (world.solids, world.visuals) = (Vec::new(), Vec::new());
+            }
+            tree.passing
+                .retain(|pair| pair.iter().all(|name| kept.contains(name)));
+        }
+        self.rename(&mut tree, &root);
+        Some(tree)
+    }
+
+    fn rename(&self, tree: &mut ModelTree, root: &str) {
+        let named = |name: &mut String| {
+            if name != root {
+                name.insert_str(0, self.prefix);
+            }
+        };
+        for link in &mut tree.links {
+            named(&mut link.name);
+            for solid in link.solids.iter_mut().chain(&mut link.visuals) {
+                if let actcheck_data::TreeGeometry::Mesh { file, .. } = &mut solid.geometry {
+                    if tree.inline_meshes.contains_key(file) {
+                        file.insert_str(0, self.prefix);
+                    } else if !self.folder.is_empty() && !Path::new(file).is_absolute() {
+                        *file = format!("{}/{file}", self.folder);
+                    }
+                }
+            }
+        }
+        for joint in &mut tree.joints {
+            joint.name.insert_str(0, self.prefix);
+            named(&mut joint.parent);
+            named(&mut joint.child);
+            if let Some(mimic) = &mut joint.mimic {
+                mimic.leader.insert_str(0, self.prefix);
+            }
+        }
+        tree.passing.iter_mut().flatten().for_each(named);
+        let meshes = std::mem::take(&mut tree.inline_meshes);
+        tree.inline_meshes = meshes
+            .into_iter()
+            .map(|(name, mesh)| (format!("{}{name}", self.prefix), mesh))
+            .collect();
+    }
+}
+
+/// Reads the mass of an `<inertial>`. Returns `None` after it has reported a fault.
+fn inertial(
+    item: &Item<'_>,
+    own: &Isometry3<f64>,
+    compiler: &Compiler,
+    reader: &mut Reader,
+) -> Option<TreeInertial> {
+    let node = item.node;
+    let attributes = compiler.attributes(node, item.class);
+    let pose = own * item.shift * compiler.pose(&attributes, node, reader);
+    let written = reader.attribute(node, "mass")?;
+    let [kg] = reader.numbers::<1>(node, written, Bound::Mass)?;
+    let about_com = match (attributes.get("fullinertia"), attributes.get("diaginertia")) {
+        (Some(text), _) => {
+            let [xx, yy, zz, xy, xz, yz] = reader.numbers(node, text, Bound::Finite)?;
+            Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+        }
+        (None, Some(text)) => Matrix3::from_diagonal(&Vector3::from(reader.numbers::<3>(
+            node,
+            text,
+            Bound::Finite,
+        )?)),
+        (None, None) if kg > 0.0 => {
+            let message = "`<inertial>` has neither `diaginertia` nor `fullinertia`".to_owned();
+            reader.error("W033", node, message, "write `diaginertia=\"XX YY ZZ\"`");
+            return None;
+        }
+        (None, None) => Matrix3::zeros(),
+    };
+    let place = reader.place(node);
+    Some(TreeInertial {
+        pose,
+        kg,
+        about_com,
+        moments_place: Some(place.clone()),
+        place,
+    })
 }
 
 /// Our camera frame in MuJoCo's, in which the view is along -z and y is up.
@@ -516,13 +833,22 @@ mod tests {
     use super::*;
     use actcheck_base::Files;
 
-    fn converted(bodies: &str, more: &str) -> Result<String, Diagnostics> {
+    fn read(bodies: &str, more: &str) -> Result<ModelTree, Diagnostics> {
         let text = format!(
             "<mujoco><compiler angle=\"radian\"/><worldbody>{bodies}</worldbody>{more}</mujoco>"
         );
-        let path = Path::new("robot.xml");
-        let found = to_urdf(&Source::new("robot.xml", text), path, &Files::Shipped);
-        found.map(|urdf| urdf.text.to_string())
+        let lookup = Lookup {
+            files: &Files::Shipped,
+            folders: Vec::new(),
+        };
+        let source = Source::new("robot.xml", text);
+        robot(&source, Path::new("robot.xml"), &lookup).map(|(tree, ..)| tree)
+    }
+
+    /// The mass of a link.
+    fn kg(tree: &ModelTree, link: &str) -> f64 {
+        let link = tree.link(link).expect("it has the link");
+        link.inertial.as_ref().map_or(0.0, |inertial| inertial.kg)
     }
 
     const BALL: &str = "<geom size=\"0.1\"/>";
@@ -535,26 +861,10 @@ mod tests {
             "<body name=\"a\">{BALL}<body name=\"b\">{BALL}</body></body><body name=\"c\">{BALL}</body>\
              <body name=\"d\"><geom size=\"0.1\" contype=\"2\" conaffinity=\"4\"/></body>"
         );
-        let urdf = converted(
-            &bodies,
-            "<contact><exclude body1=\"c\" body2=\"a\"/></contact>",
-        )
-        .expect("it is valid");
-        let pairs: Vec<&str> = urdf
-            .lines()
-            .filter(|line| line.contains("disable_collisions"))
-            .map(str::trim)
-            .collect();
-        let pair = |a: &str, b: &str| format!("<disable_collisions link1=\"{a}\" link2=\"{b}\"/>");
-        assert_eq!(
-            pairs,
-            [
-                pair("a", "c"),
-                pair("a", "d"),
-                pair("b", "d"),
-                pair("c", "d")
-            ]
-        );
+        let more = "<contact><exclude body1=\"c\" body2=\"a\"/></contact>";
+        let tree = read(&bodies, more).expect("it is valid");
+        let pairs = [["a", "c"], ["a", "d"], ["b", "d"], ["c", "d"]];
+        assert_eq!(tree.passing, pairs.map(|pair| pair.map(str::to_owned)));
     }
 
     /// Names of bodies and joints don't exclude each other; only a whole robot may move freely;
@@ -565,36 +875,98 @@ mod tests {
             "<body name=\"base\"><freejoint/>{BALL}<body name=\"jaw\" pos=\"0 0 1\">\
              <joint name=\"jaw\" axis=\"1 0 0\" ref=\"0.5\" range=\"0 1\"/>{BALL}</body></body>"
         );
-        let urdf = converted(&bodies, "").expect("it is valid");
-        assert!(
-            urdf.contains("<joint name=\"base_free\" type=\"floating\">"),
-            "{urdf}"
-        );
-        let jaw = urdf
-            .lines()
-            .find(|line| line.contains("<joint name=\"jaw\" type=\"revolute\">"))
-            .expect("it has a jaw");
-        let turned = jaw
-            .split("rpy=\"")
-            .nth(1)
-            .and_then(|text| text.split(' ').next()?.parse::<f64>().ok());
-        assert!(
-            turned.is_some_and(|roll_rad| (roll_rad + 0.5).abs() < 1e-9),
-            "{jaw}"
-        );
+        let tree = read(&bodies, "").expect("it is valid");
+        let base = tree.joint("base_free").expect("it moves freely");
+        assert_eq!(base.motion, TreeMotion::Floating);
+        let jaw = tree.joint("jaw").expect("it has a jaw");
+        let roll_rad = jaw.origin.rotation.euler_angles().0;
+        assert!((roll_rad + 0.5).abs() < 1e-9, "{roll_rad}");
     }
 
     /// A part that would be missing without a word.
     #[test]
-    fn bodies_that_are_attached_are_refused() {
-        let said = converted(
+    fn bodies_of_unknown_models_are_refused() {
+        let said = read(
             "<body name=\"a\"><attach model=\"hand\" body=\"palm\" prefix=\"h_\"/></body>",
             "",
         );
         let said = said.expect_err("a hand is missing").to_string();
         assert!(
-            said.contains("W035") && said.contains("the bodies that `<attach>` adds are not read"),
+            said.contains("W035") && said.contains("to attach"),
             "{said}"
         );
+    }
+
+    /// Frames move the joints, geoms and bodies in them; a second `<worldbody>` counts as the
+    /// first; copies are numbered and each moves on from the one before it.
+    #[test]
+    fn frames_copies_and_further_worlds_are_read() {
+        let bodies = format!(
+            "<body name=\"a\"><frame pos=\"0 0 1\" euler=\"0 0 1.5707963267948966\">\
+             <joint name=\"turn\" axis=\"1 0 0\" pos=\"0.5 0 0\"/>{BALL}<body name=\"b\" pos=\"1 0 0\">{BALL}</body>\
+             </frame></body></worldbody><worldbody><replicate count=\"12\" offset=\"0.5 0 0\" sep=\"_\">\
+             <body name=\"c\" pos=\"0 0 2\">{BALL}</body></replicate>"
+        );
+        let tree = read(&bodies, "").expect("it is valid");
+        let near = |at: Isometry3<f64>, expected: [f64; 3]| {
+            let off = (at.translation.vector - Vector3::from(expected)).norm();
+            assert!(off < 1e-9, "{at} instead of {expected:?}");
+        };
+        let turn = tree.joint("turn").expect("it has the joint");
+        near(turn.origin, [0.0, 0.5, 1.0]);
+        assert!((turn.axis - Vector3::y()).norm() < 1e-9);
+        let geom = &tree.link("a").expect("it has the body").solids[0];
+        near(geom.pose, [0.0, -0.5, 0.0]);
+        near(
+            tree.joint("b_fixed").expect("it is fixed").origin,
+            [0.0, 0.5, 0.0],
+        );
+        near(
+            tree.joint("c_11_fixed").expect("it is a copy").origin,
+            [5.5, 0.0, 2.0],
+        );
+        assert!(tree.link("c_12").is_none());
+    }
+
+    /// The masses of geoms by their own densities, of those that don't collide too, but for other
+    /// groups; `<general>` defaults of forces reach `<position>`.
+    #[test]
+    fn masses_and_forces_have_their_defaults() {
+        let geoms = "<geom type=\"box\" size=\"0.05 0.05 0.05\" density=\"500\"/>\
+                     <geom type=\"box\" size=\"0.05 0.05 0.05\" mass=\"2\" contype=\"0\" conaffinity=\"0\"/>\
+                     <geom type=\"box\" size=\"0.05 0.05 0.05\" group=\"4\"/>";
+        let bodies = format!("<body name=\"a\"><joint name=\"j\"/>{geoms}</body>");
+        let more = "<compiler inertiagrouprange=\"0 3\"/>\
+                    <default><default class=\"weak\"><general forcerange=\"-4 4\"/></default></default>\
+                    <actuator><position class=\"weak\" joint=\"j\"/></actuator>";
+        let tree = read(&bodies, more).expect("it is valid");
+        assert!((kg(&tree, "a") - 2.5).abs() < 1e-9);
+        assert_eq!(tree.joint("j").map(|joint| joint.effort), Some(4.0));
+    }
+
+    /// A box between two points is as deep as it is wide, and a mesh of vertices alone is their
+    /// hull.
+    #[test]
+    fn shapes_are_as_mujoco_has_them() {
+        let bodies = "<body name=\"a\"><geom type=\"box\" size=\"0.02\" fromto=\"0 0 0 0 0 0.12\"/></body>\
+                      <body name=\"b\"><geom type=\"mesh\" mesh=\"m\" density=\"100\"/></body>\
+                      <body name=\"c\"><geom type=\"box\" mesh=\"m\"/></body>";
+        let more = "<asset><mesh name=\"m\" vertex=\"0 0 0 1 0 0 0 2 0 1 2 0 0 0 3 1 0 3 0 2 3 1 2 3\"/></asset>";
+        let tree = read(bodies, more).expect("it is valid");
+        let size = |link: &str| {
+            let shape = tree.link(link)?.solids[0].geometry.solid()?;
+            match shape {
+                actcheck_data::Shape::Box { size } => Some(size),
+                _ => None,
+            }
+        };
+        let near = |found: Option<[f64; 3]>, expected: [f64; 3]| {
+            let found = found.expect("it is a box");
+            let off = (Vector3::from(found) - Vector3::from(expected)).norm();
+            assert!(off < 1e-9, "{found:?}");
+        };
+        near(size("a"), [0.04, 0.04, 0.12]);
+        near(size("c"), [1.0, 2.0, 3.0]);
+        assert!((kg(&tree, "b") - 600.0).abs() < 1e-9);
     }
 }

@@ -1,17 +1,22 @@
 //! Settings of a whole MJCF file: included files, default classes, units, and meshes.
 
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 
 use nalgebra::{
     Isometry3, Matrix3, Quaternion, Rotation3, Translation3, Unit, UnitQuaternion, Vector3,
 };
 
-use crate::foreign::xml::{self, Bound, Node, Reader};
+use crate::foreign::xml::{self, Bound, Node, Pieces, Reader};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Source, did_you_mean};
+use actcheck_data::TreeInertial;
 
 /// Deepest inclusion of files: deeper ones include themselves.
 const DEEPEST: usize = 8;
+/// Most copies of a `<replicate>`.
+const MOST_COPIES: usize = 1_000;
+/// Most elements of a body, with those of all copies.
+const MOST_ITEMS: usize = 10_000;
 /// Types of geoms.
 const GEOMS: [&str; 9] = [
     "plane",
@@ -26,6 +31,19 @@ const GEOMS: [&str; 9] = [
 ];
 /// The class of elements without one.
 const MAIN: &str = "main";
+/// Kinds of actuators: each is a general actuator with other defaults, and all share the defaults
+/// of a class.
+const ACTUATORS: [&str; 9] = [
+    "general",
+    "motor",
+    "position",
+    "velocity",
+    "intvelocity",
+    "damper",
+    "cylinder",
+    "muscle",
+    "adhesion",
+];
 
 type Values = BTreeMap<String, String>;
 
@@ -36,8 +54,78 @@ pub(super) struct Compiler {
     euler: String,
     /// Default attributes by class and element.
     defaults: BTreeMap<String, BTreeMap<String, Values>>,
-    /// File and scale by the mesh's name.
-    pub(super) meshes: BTreeMap<String, (String, String)>,
+    /// By the mesh's name.
+    pub(super) meshes: BTreeMap<String, MeshAsset>,
+    /// Files of other models, by their names.
+    pub(super) models: BTreeMap<String, String>,
+    /// Geoms that a `<pair>` lets collide.
+    pub(super) paired: BTreeSet<String>,
+    /// The basis of masses.
+    pub(super) masses: MassRules,
+}
+
+/// A mesh of a file.
+#[derive(Debug, Clone, Default)]
+pub(super) struct MeshAsset {
+    /// `None` if the model's file itself contains the mesh.
+    pub(super) file: Option<String>,
+    /// Factors along x, y, z.
+    pub(super) scale: [f64; 3],
+    /// The frame that the vertices are moved to, in that of the file.
+    pub(super) origin: Isometry3<f64>,
+    /// Corners of a mesh that the model's file contains, and its triangles, if it has any.
+    pub(super) vertices: Vec<[f64; 3]>,
+    pub(super) triangles: Vec<[u32; 3]>,
+    /// Whether only its surface has a mass.
+    pub(super) is_shell: bool,
+}
+
+/// The attributes of `<compiler>` that decide about masses.
+#[derive(Debug, Clone)]
+pub(super) struct MassRules {
+    /// `Some(true)`: geoms decide even where a body has an `<inertial>`; `Some(false)`: they never
+    /// do.
+    pub(super) from_geoms: Option<bool>,
+    /// Groups of the geoms that have a mass, first and last.
+    pub(super) groups: [f64; 2],
+    /// Whether impossible moments are replaced by their mean.
+    pub(super) balances: bool,
+    /// Least mass and least moment of a moving body. Units: kilograms and kg·m².
+    pub(super) least: [f64; 2],
+    /// Mass of the whole model. Unit: kilograms.
+    pub(super) total_kg: Option<f64>,
+}
+
+impl Default for MassRules {
+    fn default() -> Self {
+        Self {
+            from_geoms: None,
+            groups: [0.0, 5.0],
+            balances: false,
+            least: [0.0; 2],
+            total_kg: None,
+        }
+    }
+}
+
+impl MassRules {
+    /// Raises a mass and its moments to the least ones, and replaces impossible moments.
+    pub(super) fn apply(&self, inertial: &mut TreeInertial) {
+        let [least_kg, least_moment] = self.least;
+        inertial.kg = inertial.kg.max(least_kg);
+        let eigen = inertial.about_com.symmetric_eigen();
+        let moments = eigen.eigenvalues;
+        let is_impossible = moments.max() > moments.sum() - moments.max();
+        if !(self.balances && is_impossible) && moments.min() >= least_moment {
+            return;
+        }
+        let mut moments = moments.map(|moment| moment.max(least_moment));
+        if self.balances && moments.max() > moments.sum() - moments.max() {
+            moments = Vector3::repeat(moments.mean());
+        }
+        let axes = eigen.eigenvectors;
+        inertial.about_com = axes * Matrix3::from_diagonal(&moments) * axes.transpose();
+    }
 }
 
 /// The attributes of an element, with the defaults of its class.
@@ -54,6 +142,41 @@ impl<'a> Attributes<'a> {
             .or_else(|| self.defaults?.get(name).map(String::as_str))
             .map(str::trim)
     }
+
+    /// Returns the first number of an attribute; `None` if there is none, or it is not a number.
+    pub(super) fn number(&self, name: &str) -> Option<f64> {
+        let number: f64 = self.get(name)?.split_whitespace().next()?.parse().ok()?;
+        number.is_finite().then_some(number)
+    }
+}
+
+/// An element inside of a body, its `<frame>`s and `<replicate>`s.
+pub(super) struct Item<'a> {
+    pub(super) node: Node<'a>,
+    /// The frame of the element in that of the body.
+    pub(super) shift: Isometry3<f64>,
+    pub(super) class: Option<&'a str>,
+    /// The end of its name: the number of its copy.
+    pub(super) suffix: String,
+}
+
+/// The elements in a body, and the number of those that were visited.
+#[derive(Default)]
+struct Content<'a> {
+    items: Vec<Item<'a>>,
+    n_visited: usize,
+}
+
+impl Item<'_> {
+    /// Returns its name, if it has one.
+    pub(super) fn name(&self) -> Option<String> {
+        let name = self.node.attribute("name")?;
+        Some(format!("{name}{}", self.suffix))
+    }
+
+    pub(super) fn is(&self, name: &str) -> bool {
+        self.node.has_tag_name(name)
+    }
 }
 
 impl Compiler {
@@ -63,6 +186,9 @@ impl Compiler {
             euler: "xyz".to_owned(),
             defaults: BTreeMap::new(),
             meshes: BTreeMap::new(),
+            models: BTreeMap::new(),
+            paired: BTreeSet::new(),
+            masses: MassRules::default(),
         };
         if root.tag_name().name() != "mujoco" {
             let message = format!(
@@ -76,46 +202,127 @@ impl Compiler {
                 "an MJCF file begins with `<mujoco model=\"…\">`",
             );
         }
-        let mut folder = String::new();
+        let mut folders = Folders::default();
         for settings in xml::children(root, "compiler") {
-            if settings.attribute("angle") == Some("radian") {
-                compiler.angle = 1.0;
-            }
-            if let Some(sequence) = settings.attribute("eulerseq") {
-                sequence.clone_into(&mut compiler.euler);
-            }
-            if let Some(written) = settings
-                .attribute("meshdir")
-                .or(settings.attribute("assetdir"))
-            {
-                folder = format!("{}/", written.trim_end_matches('/'));
-            }
+            compiler.read_settings(settings, &mut folders, reader);
         }
         for defaults in xml::children(root, "default") {
             let class = defaults.attribute("class").unwrap_or(MAIN);
             compiler.add_class(defaults, class, &BTreeMap::new());
         }
-        for mesh in xml::children(root, "asset")
-            .flat_map(|assets| xml::children(assets, "mesh").collect::<Vec<_>>())
-        {
-            let attributes = compiler.attributes(mesh, None);
-            let Some(file) = attributes.get("file") else {
-                continue;
-            };
-            let stem = Path::new(file)
-                .file_stem()
-                .map(|stem| stem.to_string_lossy().into_owned());
-            let name = mesh
-                .attribute("name")
-                .map(str::to_owned)
-                .or(stem)
-                .unwrap_or_default();
-            let scale = attributes.get("scale").unwrap_or("1 1 1").to_owned();
-            let file = format!("{folder}{file}");
-            compiler.meshes.insert(name, (file, scale));
+        let sections = |name| xml::children(root, name).flat_map(|of| of.children());
+        for asset in sections("asset") {
+            match asset.tag_name().name() {
+                "mesh" => compiler.add_mesh(asset, &folders, reader),
+                "model" => compiler.add_model(asset, reader),
+                _ => {}
+            }
+        }
+        for pair in sections("contact").filter(|node| node.has_tag_name("pair")) {
+            let ends = ["geom1", "geom2"].into_iter();
+            compiler
+                .paired
+                .extend(ends.filter_map(|end| pair.attribute(end).map(str::to_owned)));
         }
         compiler.check_names(root, reader);
         compiler
+    }
+
+    fn read_settings(&mut self, settings: Node, folders: &mut Folders, reader: &mut Reader) {
+        match settings.attribute("angle") {
+            Some("radian") => self.angle = 1.0,
+            Some("degree") => self.angle = 1f64.to_radians(),
+            _ => {}
+        }
+        if let Some(sequence) = settings.attribute("eulerseq") {
+            sequence.clone_into(&mut self.euler);
+        }
+        let written = settings
+            .attribute("meshdir")
+            .or(settings.attribute("assetdir"));
+        if let Some(written) = written {
+            folders.meshes = format!("{}/", written.trim_end_matches('/'));
+        }
+        if let Some(strips) = settings.attribute("strippath") {
+            folders.strips = strips == "true";
+        }
+        if settings.attribute("coordinate") == Some("global") {
+            let message = "global coordinates are not read".to_owned();
+            let help = "write local ones, as MuJoCo 2.3.3 and later need them";
+            reader.error("W035", settings, message, help);
+        }
+        let masses = &mut self.masses;
+        match settings.attribute("inertiafromgeom") {
+            Some("true") => masses.from_geoms = Some(true),
+            Some("false") => masses.from_geoms = Some(false),
+            Some("auto") => masses.from_geoms = None,
+            _ => {}
+        }
+        if let Some(balances) = settings.attribute("balanceinertia") {
+            masses.balances = balances == "true";
+        }
+        let mut number = |key: &str, bound: Bound| {
+            let written = settings.attribute(key)?;
+            reader
+                .numbers::<1>(settings, written, bound)
+                .map(|[number]| number)
+        };
+        masses.least[0] = number("boundmass", Bound::NotNegative).unwrap_or(masses.least[0]);
+        masses.least[1] = number("boundinertia", Bound::NotNegative).unwrap_or(masses.least[1]);
+        let total = number("settotalmass", Bound::Finite);
+        masses.total_kg = total.filter(|kg| *kg > 0.0).or(masses.total_kg);
+        if let Some(written) = settings.attribute("inertiagrouprange") {
+            let groups = reader.numbers(settings, written, Bound::Finite);
+            masses.groups = groups.unwrap_or(masses.groups);
+        }
+    }
+
+    fn add_mesh(&mut self, node: Node, folders: &Folders, reader: &mut Reader) {
+        let attributes = self.attributes(node, None);
+        let file = attributes.get("file").map(|file| folders.path(file));
+        let stem = file.as_deref().and_then(stem);
+        let Some(name) = node.attribute("name").map(str::to_owned).or(stem) else {
+            return;
+        };
+        let numbers = |key: &str| attributes.get(key);
+        let scale = numbers("scale").and_then(|text| reader.numbers(node, text, Bound::Finite));
+        let position =
+            numbers("refpos").and_then(|text| reader.numbers::<3>(node, text, Bound::Finite));
+        let turn = numbers("refquat")
+            .and_then(|text| reader.numbers::<4>(node, text, Bound::Finite))
+            .and_then(|[w, x, y, z]| UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-9));
+        let mut mesh = MeshAsset {
+            scale: scale.unwrap_or([1.0; 3]),
+            origin: Isometry3::from_parts(
+                Translation3::from(Vector3::from(position.unwrap_or_default())),
+                turn.unwrap_or_default(),
+            ),
+            is_shell: attributes.get("inertia") == Some("shell"),
+            ..MeshAsset::default()
+        };
+        if file.is_none() {
+            let Some(vertices) = attributes.get("vertex") else {
+                let message = format!("the mesh `{name}` has neither `file` nor `vertex`");
+                let help = "name a file: MuJoCo's built-in meshes are not read";
+                reader.error("W035", node, message, help);
+                return;
+            };
+            mesh.vertices = triples(node, vertices, reader).unwrap_or_default();
+            if let Some(faces) = attributes.get("face") {
+                mesh.triangles = triples(node, faces, reader).unwrap_or_default();
+            }
+        }
+        mesh.file = file;
+        self.meshes.insert(name, mesh);
+    }
+
+    fn add_model(&mut self, node: Node, reader: &mut Reader) {
+        let Some(file) = reader.attribute(node, "file") else {
+            return;
+        };
+        let name = node.attribute("name").map(str::to_owned).or(stem(file));
+        self.models
+            .insert(name.unwrap_or_default(), file.to_owned());
     }
 
     /// Reports classes without defaults, and types of geoms that don't exist: with other defaults
@@ -164,7 +371,9 @@ impl Compiler {
             .children()
             .filter(|child| child.is_element() && child.tag_name().name() != "default")
         {
-            let values = own.entry(element.tag_name().name().to_owned()).or_default();
+            let values = own
+                .entry(kind(element.tag_name().name()).to_owned())
+                .or_default();
             values.extend(
                 element
                     .attributes()
@@ -185,8 +394,97 @@ impl Compiler {
         let defaults = self.defaults.get(class).or_else(|| self.defaults.get(MAIN));
         Attributes {
             node,
-            defaults: defaults.and_then(|elements| elements.get(node.tag_name().name())),
+            defaults: defaults.and_then(|elements| elements.get(kind(node.tag_name().name()))),
         }
+    }
+
+    /// Returns the elements in a body: its own, and those of its `<frame>`s and `<replicate>`s.
+    pub(super) fn content<'a>(
+        &self,
+        body: Node<'a>,
+        class: Option<&'a str>,
+        reader: &mut Reader,
+    ) -> Vec<Item<'a>> {
+        let whole = Item {
+            node: body,
+            shift: Isometry3::identity(),
+            class,
+            suffix: String::new(),
+        };
+        let mut found = Content::default();
+        self.add_content(&whole, &mut found, reader);
+        if found.n_visited > MOST_ITEMS {
+            let message = format!("this element has more than {MOST_ITEMS} others and copies");
+            reader.error("W055", body, message, "use fewer copies");
+        }
+        found.items
+    }
+
+    fn add_content<'a>(&self, of: &Item<'a>, found: &mut Content<'a>, reader: &mut Reader) {
+        for node in of.node.children().filter(Node::is_element) {
+            found.n_visited += 1;
+            if found.n_visited > MOST_ITEMS {
+                return;
+            }
+            let inside = |shift: Isometry3<f64>, suffix: String| Item {
+                node,
+                shift,
+                class: node.attribute("childclass").or(of.class),
+                suffix,
+            };
+            match node.tag_name().name() {
+                "frame" => {
+                    let pose = self.pose(&self.attributes(node, of.class), node, reader);
+                    let frame = inside(of.shift * pose, of.suffix.clone());
+                    self.add_content(&frame, found, reader);
+                }
+                "replicate" => {
+                    let Some((count, step)) = self.copies(node, reader) else {
+                        continue;
+                    };
+                    let digits = count.to_string().len();
+                    let separator = node.attribute("sep").unwrap_or_default();
+                    let mut shift = of.shift;
+                    for number in 0..count {
+                        found.n_visited += 1;
+                        if found.n_visited > MOST_ITEMS {
+                            return;
+                        }
+                        let suffix = format!("{separator}{number:0digits$}{}", of.suffix);
+                        self.add_content(&inside(shift, suffix), found, reader);
+                        shift *= step;
+                    }
+                }
+                _ => found.items.push(Item {
+                    node,
+                    shift: of.shift,
+                    class: of.class,
+                    suffix: of.suffix.clone(),
+                }),
+            }
+        }
+    }
+
+    /// Returns the number of copies of a `<replicate>`, and the pose of each in the frame of the
+    /// one before it.
+    fn copies(&self, node: Node, reader: &mut Reader) -> Option<(usize, Isometry3<f64>)> {
+        let written = reader.attribute(node, "count")?;
+        let count = written.parse().ok().filter(|count| *count <= MOST_COPIES);
+        let Some(count) = count else {
+            let message = format!("`count` must be a whole number up to {MOST_COPIES}");
+            reader.error("W034", node, message, "use fewer copies");
+            return None;
+        };
+        let mut three = |key: &str| match node.attribute(key) {
+            Some(text) => reader.numbers::<3>(node, text, Bound::Finite),
+            None => Some([0.0; 3]),
+        };
+        let (offset, euler) = (three("offset")?, three("euler")?);
+        let step = Isometry3::from_parts(
+            Translation3::from(Vector3::from(offset)),
+            self.turned(euler),
+        );
+        Some((count, step))
     }
 
     /// Returns the pose of an element; the identity after it has reported a fault.
@@ -260,7 +558,69 @@ impl Compiler {
     }
 }
 
-/// Returns a text in which each `<include file="…"/>` is replaced by the elements of that file.
+/// The folders of a file's meshes.
+#[derive(Default)]
+struct Folders {
+    meshes: String,
+    /// Whether only the last parts of paths count.
+    strips: bool,
+}
+
+impl Folders {
+    fn path(&self, file: &str) -> String {
+        let last = file.rsplit(['/', '\\']).next().unwrap_or(file);
+        let file = if self.strips { last } else { file };
+        format!("{}{file}", self.meshes)
+    }
+}
+
+/// The element whose defaults an element has.
+fn kind(element: &str) -> &str {
+    if ACTUATORS.contains(&element) {
+        ACTUATORS[0]
+    } else {
+        element
+    }
+}
+
+/// The name of a file without its folders and its ending.
+fn stem(file: &str) -> Option<String> {
+    let stem = Path::new(file).file_stem()?;
+    Some(stem.to_string_lossy().into_owned())
+}
+
+/// Reads a list of triples. Returns `None` after it has reported a fault.
+fn triples<T: std::str::FromStr + Copy>(
+    node: Node,
+    text: &str,
+    reader: &mut Reader,
+) -> Option<Vec<[T; 3]>> {
+    let numbers: Option<Vec<T>> = text
+        .split_whitespace()
+        .map(|word| word.parse().ok())
+        .collect();
+    let numbers = numbers.unwrap_or_default();
+    if numbers.is_empty() || !numbers.len().is_multiple_of(3) {
+        let message = "a mesh needs three numbers for each vertex and each face".to_owned();
+        reader.error("W034", node, message, "separate numbers by spaces");
+        return None;
+    }
+    Some(
+        numbers
+            .chunks_exact(3)
+            .map(|three| [three[0], three[1], three[2]])
+            .collect(),
+    )
+}
+
+/// A text in which each `<include file="…"/>` is replaced by the elements of that file.
+pub(super) struct Whole {
+    pub(super) source: Source,
+    pub(super) pieces: Pieces,
+}
+
+/// Replaces each `<include file="…"/>` by the elements of that file. A path is relative to the
+/// first file, or to the one that includes it.
 ///
 /// # Errors
 /// Faults of XML (W031, W055), a file that can't be read (W035).
@@ -268,43 +628,94 @@ pub(super) fn with_includes(
     source: &Source,
     path: &Path,
     files: &Files,
-    depth: usize,
-) -> Result<String, Diagnostics> {
-    let document = xml::parse_model(source, &source.text)?;
-    let mut text = source.text.to_string();
-    let includes: Vec<Node> = document
-        .descendants()
-        .filter(|node| node.tag_name().name() == "include")
-        .collect();
-    // From the last place to the first, so that the others stay valid.
-    for include in includes.into_iter().rev() {
-        let file = include.attribute("file").unwrap_or_default();
-        let fault = |message: String| {
-            let help = "the path is relative to the file that includes it";
-            Diagnostics::from(
-                Diagnostic::error("W035", message)
-                    .at(source, xml::span(include))
-                    .help(help),
-            )
-        };
-        if depth >= DEEPEST {
-            return Err(fault(format!(
-                "`{file}` is included {DEEPEST} files deep: it may include itself"
-            )));
+) -> Result<Whole, Diagnostics> {
+    let mut whole = Splice {
+        text: String::new(),
+        pieces: Vec::new(),
+        main: path.parent().unwrap_or(Path::new("")),
+        files,
+    };
+    whole.add(source, path, 0)?;
+    Ok(Whole {
+        source: Source::new(source.name.to_string(), whole.text),
+        pieces: whole.pieces,
+    })
+}
+
+/// A text that is being put together.
+struct Splice<'a> {
+    text: String,
+    pieces: Pieces,
+    /// Folder of the first file.
+    main: &'a Path,
+    files: &'a Files,
+}
+
+impl Splice<'_> {
+    /// Adds a text; if it is included at a depth, only the elements below its root.
+    fn add(&mut self, source: &Source, path: &Path, depth: usize) -> Result<(), Diagnostics> {
+        let document = xml::parse_model(source, &source.text)?;
+        if self.text.len() + source.text.len() > xml::LONGEST_MODEL {
+            let message = "with all files that it includes, this model is too long";
+            return Err(Diagnostic::error("W055", message)
+                .at(source, 0..0)
+                .help("include fewer files, each once")
+                .into());
         }
-        let other = path.parent().unwrap_or(Path::new("")).join(file);
-        let included = files
-            .read(&other)
-            .map_err(|reason| fault(format!("cannot read {}: {reason}", other.display())))?;
-        let whole = with_includes(&included, &other, files, depth + 1)?;
-        let whole = Source::new(included.name.to_string(), whole);
-        let elements = xml::parse_model(&whole, &whole.text)?;
-        let inside: String = elements
-            .root_element()
-            .children()
-            .map(|child| &whole.text[child.range()])
-            .collect();
-        text.replace_range(include.range(), &inside);
+        let root = document.root_element();
+        let range = match (depth, root.first_child(), root.last_child()) {
+            (0, ..) => 0..source.text.len(),
+            (_, Some(first), Some(last)) => first.range().start..last.range().end,
+            _ => return Ok(()),
+        };
+        let mut at = range.start;
+        let includes = document
+            .descendants()
+            .filter(|node| node.tag_name().name() == "include");
+        for include in includes {
+            self.copy(source, at..include.range().start);
+            at = include.range().end;
+            let file = include.attribute("file").unwrap_or_default();
+            let fault = |message: String| {
+                let help = "the path is relative to the first file, or to the one that includes it";
+                Diagnostics::from(
+                    Diagnostic::error("W035", message)
+                        .at(source, xml::span(include))
+                        .help(help),
+                )
+            };
+            if depth >= DEEPEST {
+                return Err(fault(format!(
+                    "`{file}` is included {DEEPEST} files deep: it may include itself"
+                )));
+            }
+            let folders = [self.main, path.parent().unwrap_or(Path::new(""))];
+            let (other, included) = self.read(file, folders).map_err(fault)?;
+            self.add(&included, &other, depth + 1)?;
+        }
+        self.copy(source, at..range.end);
+        Ok(())
     }
-    Ok(text)
+
+    /// Reads a file in the first of these folders that has it.
+    fn read(&self, file: &str, folders: [&Path; 2]) -> Result<(PathBuf, Source), String> {
+        let mut reasons = Vec::new();
+        for folder in folders {
+            let path = folder.join(file);
+            match self.files.read(&path) {
+                Ok(found) => return Ok((path, found)),
+                Err(reason) => reasons.push(format!("cannot read {}: {reason}", path.display())),
+            }
+        }
+        reasons.dedup();
+        Err(reasons.join("; "))
+    }
+
+    fn copy(&mut self, source: &Source, range: std::ops::Range<usize>) {
+        let start = range.start;
+        if let Some(text) = source.text.get(range) {
+            self.pieces.push((self.text.len(), source.clone(), start));
+            self.text.push_str(text);
+        }
+    }
 }

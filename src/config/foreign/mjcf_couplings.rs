@@ -94,26 +94,15 @@ impl Couplings {
                     .map(|(joint, share)| (joint.clone(), range_of(*share)));
                 self.ranges.extend(ranges);
             }
-            let is_motor = actuator.tag_name().name() == "motor";
-            let limits = attributes.get("forcerange").or(if is_motor {
-                attributes.get("ctrlrange")
-            } else {
-                None
-            });
-            let Some([lower, upper]) =
-                limits.and_then(|text| reader.numbers(actuator, text, Bound::Finite))
-            else {
+            let Some([lower, upper]) = force_range(actuator, &attributes, reader) else {
                 continue;
             };
-            let gear = attributes
-                .get("gear")
-                .and_then(|text| text.split_whitespace().next()?.parse::<f64>().ok());
-            let most = f64::max(-lower, upper) * gear.unwrap_or(1.0).abs();
-            self.efforts.extend(
-                moved
-                    .into_iter()
-                    .map(|(joint, share)| (joint, most * share.abs())),
-            );
+            let most = f64::max(-lower, upper) * attributes.number("gear").unwrap_or(1.0).abs();
+            for (joint, share) in moved {
+                let effort = most * share.abs();
+                let known = self.efforts.entry(joint).or_insert(effort);
+                *known = known.max(effort);
+            }
         }
     }
 
@@ -204,6 +193,39 @@ impl Couplings {
             self.mimics
                 .insert(follower.0.clone(), (leader.0.clone(), factor, offset));
         }
+    }
+}
+
+/// The range of an actuator's force: its limit, or that of a motor's control signal. Returns `None`
+/// if it is unlimited.
+fn force_range(
+    actuator: Node,
+    attributes: &Attributes<'_>,
+    reader: &mut Reader,
+) -> Option<[f64; 2]> {
+    let mut limits = |key: &str, limited: &str| {
+        let written = attributes
+            .get(key)
+            .filter(|_| attributes.get(limited) != Some("false"))?;
+        reader.numbers::<2>(actuator, written, Bound::Finite)
+    };
+    let of_force = limits("forcerange", "forcelimited");
+    let is = |key: &str, usual: &str| attributes.get(key).unwrap_or(usual) == usual;
+    // The force of a motor, and of other actuators without a bias, is the signal times the gain.
+    let gain = match actuator.tag_name().name() {
+        "motor" => Some(1.0),
+        "general" if is("gaintype", "fixed") && is("biastype", "none") => {
+            Some(attributes.number("gainprm").unwrap_or(1.0))
+        }
+        _ => None,
+    };
+    let of_signal = gain.and_then(|gain| {
+        let [a, b] = limits("ctrlrange", "ctrllimited")?.map(|end| end * gain);
+        Some([a.min(b), a.max(b)])
+    });
+    match (of_force, of_signal) {
+        (Some([a, b]), Some([c, d])) => Some([a.max(c), b.min(d)]),
+        (limits, None) | (None, limits) => limits,
     }
 }
 

@@ -1,166 +1,309 @@
-//! Geoms of bodies in MJCF: those that collide, with their shapes and masses.
+//! Geoms of bodies in MJCF, with their shapes, masses and friction.
+
+use std::f64::consts::PI;
+use std::rc::Rc;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
-use crate::foreign::mjcf::{DENSITY, Robot};
-use crate::foreign::mjcf_compiler::Attributes;
-use crate::foreign::mjcf_materials::collides;
-use crate::foreign::urdf_text::escaped;
-use crate::foreign::xml::{self, Bound, Node, Reader};
+use crate::foreign::geometry::Shapes;
+use crate::foreign::hull::convex_hull;
+use crate::foreign::mjcf::Model;
+use crate::foreign::mjcf_compiler::{Attributes, Item, MeshAsset};
+use crate::foreign::mjcf_masks::collides;
+use crate::foreign::solid_mass::equivalent_box;
+use crate::foreign::xml::{Bound, Node, Reader};
+use actcheck_data::{Matter, Mesh, Shape, TreeGeometry, TreeSolid};
 
-impl Robot {
-    /// Returns the colliding geoms of a body, each with its mass if its volume is known.
-    pub(super) fn solids(
-        &self,
-        body: Node,
-        own: &Isometry3<f64>,
-        class: Option<&str>,
-        reader: &mut Reader,
-    ) -> Vec<(Isometry3<f64>, String, Option<f64>)> {
-        xml::children(body, "geom")
-            .filter_map(|geom| self.solid(geom, own, class, reader))
-            .collect()
-    }
+/// Density of geoms: MuJoCo's default. Unit: kg/m³.
+const DENSITY: f64 = 1000.0;
 
-    /// Returns a geom if it collides, with its mass if its volume is known.
-    pub(super) fn solid(
-        &self,
-        geom: Node,
+/// A shape, and its pose in the frame of its geom if it has one of its own.
+type Placed = (TreeGeometry, Option<Isometry3<f64>>);
+
+impl<'a> Model<'a> {
+    /// Returns the geoms in a body: those that collide, and those that are only seen. `own` is the
+    /// frame of the body in that of its link.
+    pub(super) fn geoms(
+        &mut self,
+        content: &[Item<'_>],
         own: &Isometry3<f64>,
-        class: Option<&str>,
         reader: &mut Reader,
-    ) -> Option<(Isometry3<f64>, String, Option<f64>)> {
-        let attributes = self.compiler.attributes(geom, class);
-        if !collides(&attributes) {
-            return None;
+    ) -> [Vec<TreeSolid>; 2] {
+        let [mut solids, mut visuals] = [Vec::new(), Vec::new()];
+        for item in content.iter().filter(|item| item.is("geom")) {
+            let compiler = Rc::clone(&self.compiler);
+            let attributes = compiler.attributes(item.node, item.class);
+            let Some(solid) = self.geom(item, &attributes, own, reader) else {
+                continue;
+            };
+            if collides(&attributes, &compiler) {
+                solids.push(solid);
+            } else {
+                visuals.push(solid);
+            }
         }
-        let pose = own * self.compiler.pose(&attributes, geom, reader);
-        let (moved, shape, volume) = self.shape(geom, &attributes, reader)?;
-        let density = attributes
-            .get("density")
-            .and_then(|text| text.parse().ok())
-            .unwrap_or(DENSITY);
-        let stated = attributes.get("mass").and_then(|text| text.parse().ok());
-        // An end-to-end geom has its pose from its ends.
-        let pose = moved.map_or(pose, |moved| own * moved);
-        Some((
-            pose,
-            shape,
-            stated.or(volume.map(|volume| volume * density)),
-        ))
+        [solids, visuals]
     }
 
-    /// The pose of a geom that is given by its ends, its element of a `<geometry>`, and its volume
-    /// if it is known.
-    fn shape(
+    /// Reads a geom. Returns `None` for the ground, and after it has reported a fault.
+    fn geom(
+        &mut self,
+        item: &Item<'_>,
+        attributes: &Attributes<'_>,
+        own: &Isometry3<f64>,
+        reader: &mut Reader,
+    ) -> Option<TreeSolid> {
+        let geom = item.node;
+        let is_solid = collides(attributes, &self.compiler);
+        let kind = match attributes.get("type") {
+            Some(kind) => kind,
+            None if attributes.get("mesh").is_some() => "mesh",
+            None => "sphere",
+        };
+        let shift = own * item.shift;
+        let pose = shift * self.compiler.pose(attributes, geom, reader);
+        let (geometry, moved) = match kind {
+            "plane" | "hfield" | "sdf" => {
+                if is_solid {
+                    let message = format!("the geom of the type {kind} is left out");
+                    let help = "the floor and the furniture of a scene are those of its world";
+                    reader.warning("W036", geom, message, help);
+                }
+                return None;
+            }
+            "mesh" => {
+                let name = attributes.get("mesh").unwrap_or_default();
+                (self.mesh(name, geom, reader)?, None)
+            }
+            _ if attributes.get("mesh").is_some() => self.fitted(kind, geom, attributes, reader)?,
+            _ => primitive(kind, geom, attributes, reader)?,
+        };
+        Some(TreeSolid {
+            // A geom between two points has its pose from these.
+            pose: match (moved, attributes.get("mesh")) {
+                (Some(moved), None) => shift * moved,
+                (Some(moved), Some(_)) => pose * moved,
+                (None, _) => pose,
+            },
+            geometry,
+            matter: self.matter(geom, attributes, reader),
+            friction: attributes
+                .number("friction")
+                .filter(|number| *number >= 0.0),
+            place: reader.place(geom),
+        })
+    }
+
+    /// The basis of a geom's mass; `None` if it has none.
+    fn matter(
         &self,
         geom: Node,
         attributes: &Attributes<'_>,
         reader: &mut Reader,
-    ) -> Option<(Option<Isometry3<f64>>, String, Option<f64>)> {
-        use std::f64::consts::PI;
-        let kind = attributes
-            .get("type")
-            .unwrap_or(if attributes.get("mesh").is_some() {
-                "mesh"
-            } else {
-                "sphere"
-            });
-        if kind == "mesh" {
-            let name = attributes.get("mesh").unwrap_or_default();
-            let Some((file, scale)) = self.compiler.meshes.get(name) else {
-                let message = format!("there is no mesh `{name}` in `<asset>`");
-                reader.error(
-                    "W035",
-                    geom,
-                    message,
-                    "add `<mesh name=\"…\" file=\"…\"/>` to `<asset>`",
-                );
-                return None;
-            };
-            let file = escaped(file);
-            return Some((
-                None,
-                format!("<mesh filename=\"{file}\" scale=\"{scale}\"/>"),
-                None,
-            ));
-        }
-        if !["sphere", "box", "cylinder", "capsule", "ellipsoid"].contains(&kind) {
-            // A plane or a height field does not belong to a robot or an object.
+    ) -> Option<Matter> {
+        let [first, last] = self.compiler.masses.groups;
+        let group = attributes.number("group").unwrap_or(0.0);
+        if group < first || group > last {
             return None;
         }
-        let size: Vec<f64> = attributes
-            .get("size")
-            .unwrap_or_default()
-            .split_whitespace()
-            .filter_map(|word| word.parse().ok())
-            .collect();
-        let ends = match attributes.get("fromto") {
-            Some(text) => Some(reader.numbers::<6>(geom, text, Bound::Finite)?),
-            None => None,
-        };
-        let (moved, half_length) = match ends {
-            Some([ax, ay, az, bx, by, bz]) => {
-                let (a, b) = (Point3::new(ax, ay, az), Point3::new(bx, by, bz));
-                let turned = UnitQuaternion::rotation_between(&Vector3::z(), &(b - a))
-                    .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI));
-                let middle = nalgebra::center(&a, &b);
-                (
-                    Some(Isometry3::from_parts(
-                        Translation3::from(middle.coords),
-                        turned,
-                    )),
-                    Some((b - a).norm() / 2.0),
-                )
-            }
-            None => (None, size.get(1).copied()),
-        };
-        let wanted = match (kind, ends) {
-            ("sphere", _) | ("cylinder" | "capsule", Some(_)) => 1,
-            ("cylinder" | "capsule", None) => 2,
-            _ => 3,
-        };
-        if size.len() < wanted
-            || size
-                .iter()
-                .any(|number| !(number.is_finite() && *number >= 0.0))
-        {
-            let message =
-                format!("a geom of the type {kind} needs {wanted} positive numbers in `size`");
-            reader.error(
-                "W034",
-                geom,
-                message,
-                "sizes are radii and half lengths in metres",
-            );
+        let mesh = attributes
+            .get("mesh")
+            .and_then(|name| self.compiler.meshes.get(name));
+        let is_shell = attributes.get("shellinertia") == Some("true")
+            || mesh.is_some_and(|mesh| mesh.is_shell);
+        if is_shell && attributes.get("type") == Some("ellipsoid") {
+            let message = "the inertia of a hollow ellipsoid is not read".to_owned();
+            reader.error("W035", geom, message, "give its body an `<inertial>`");
             return None;
         }
-        let (r, half) = (size[0], half_length.unwrap_or(0.0));
-        let (shape, volume) = match kind {
-            "sphere" => (
-                format!("<sphere radius=\"{r}\"/>"),
-                4.0 / 3.0 * PI * r.powi(3),
-            ),
-            "cylinder" => (
-                format!("<cylinder radius=\"{r}\" length=\"{}\"/>", 2.0 * half),
-                2.0 * PI * r * r * half,
-            ),
-            "capsule" => (
-                format!("<capsule radius=\"{r}\" length=\"{}\"/>", 2.0 * half),
-                2.0 * PI * r * r * half + 4.0 / 3.0 * PI * r.powi(3),
-            ),
-            "ellipsoid" if self.materials.is_some() => {
-                let [x, y, z] = [size[0], size[1], size[2]];
-                (
-                    format!("<ellipsoid radii=\"{x} {y} {z}\"/>"),
-                    4.0 / 3.0 * PI * x * y * z,
-                )
-            }
-            _ => {
-                let [x, y, z] = [size[0], size[1], size[2]].map(|extent| 2.0 * extent);
-                (format!("<box size=\"{x} {y} {z}\"/>"), x * y * z)
-            }
+        let mut number = |key: &str| {
+            let written = attributes.get(key)?;
+            reader
+                .numbers::<1>(geom, written, Bound::NotNegative)
+                .map(|[number]| number)
         };
-        Some((moved, shape, Some(volume)))
+        Some(match (number("mass"), is_shell) {
+            (Some(kg), false) => Matter::Mass(kg),
+            (Some(kg), true) => Matter::ShellMass(kg),
+            (None, false) => Matter::Density(number("density").unwrap_or(DENSITY)),
+            (None, true) => Matter::Shell(number("density").unwrap_or(DENSITY)),
+        })
     }
+
+    /// Returns a mesh of `<asset>`. Returns `None` after it has reported a fault.
+    fn mesh(&mut self, name: &str, geom: Node, reader: &mut Reader) -> Option<TreeGeometry> {
+        let asset = self.asset(name, geom, reader)?;
+        let is_moved = asset.origin != Isometry3::identity();
+        match &asset.file {
+            Some(file) if !is_moved => Some(TreeGeometry::Mesh {
+                file: file.clone(),
+                scale: asset.scale,
+            }),
+            _ => {
+                let mesh = self.vertices(&asset, geom, reader)?;
+                let file = format!("<mesh name=\"{name}\">");
+                self.keep_mesh(&file, mesh);
+                Some(TreeGeometry::Mesh {
+                    file,
+                    scale: [1.0; 3],
+                })
+            }
+        }
+    }
+
+    fn asset(&self, name: &str, geom: Node, reader: &mut Reader) -> Option<MeshAsset> {
+        let found = self.compiler.meshes.get(name).cloned();
+        if found.is_none() {
+            let message = format!("there is no mesh `{name}` in `<asset>`");
+            let help = "add `<mesh name=\"…\" file=\"…\"/>` to `<asset>`";
+            reader.error("W035", geom, message, help);
+        }
+        found
+    }
+
+    /// A reader of the meshes that the file names.
+    pub(super) fn shapes(&self) -> Shapes<'a> {
+        Shapes::new(self.file.lookup, self.file.path)
+    }
+
+    /// Returns a mesh in its own frame and at its own scale. Returns `None` after it has reported a
+    /// fault.
+    fn vertices(&self, asset: &MeshAsset, geom: Node, reader: &mut Reader) -> Option<Mesh> {
+        let mesh = match &asset.file {
+            Some(file) => {
+                let mut shapes = self.shapes();
+                let place = reader.place(geom);
+                match shapes.mesh_at(&place, file, [1.0; 3], &mut reader.found)? {
+                    Shape::Mesh { mesh } => mesh,
+                    _ => return None,
+                }
+            }
+            None => {
+                let triangles = if asset.triangles.is_empty() {
+                    convex_hull(&asset.vertices)
+                } else {
+                    asset.triangles.clone()
+                };
+                match Mesh::new(asset.vertices.clone(), triangles) {
+                    Ok(mesh) => mesh,
+                    Err(fault) => {
+                        let help = "give it at least four vertices that are not in one plane";
+                        reader.error("W037", geom, fault.to_string(), help);
+                        return None;
+                    }
+                }
+            }
+        };
+        // As in MuJoCo: moved, turned, then scaled.
+        let inverse = asset.origin.inverse();
+        let moved = |vertex: &[f64; 3]| (inverse * Point3::from(*vertex)).coords.into();
+        let vertices = mesh.vertices.iter().map(moved).collect();
+        let moved = Mesh::new(vertices, mesh.triangles).ok()?;
+        Some(moved.scaled(asset.scale))
+    }
+
+    /// Returns a primitive that is fitted to a mesh: the one with the same moments of inertia.
+    fn fitted(
+        &self,
+        kind: &str,
+        geom: Node,
+        attributes: &Attributes<'_>,
+        reader: &mut Reader,
+    ) -> Option<Placed> {
+        let name = attributes.get("mesh").unwrap_or_default();
+        let asset = self.asset(name, geom, reader)?;
+        let mesh = self.vertices(&asset, geom, reader)?;
+        let Some((pose, half)) = equivalent_box(&mesh) else {
+            let message = format!("the mesh `{name}` has no volume to fit a primitive to");
+            reader.error("W037", geom, message, "name a closed mesh");
+            return None;
+        };
+        let scale = attributes.number("fitscale").unwrap_or(1.0);
+        let [x, y, z] = half.map(|half| half * scale);
+        let radius = (x + y) / 2.0;
+        let geometry = match kind {
+            "sphere" => TreeGeometry::Sphere {
+                radius: (x + y + z) / 3.0,
+            },
+            "capsule" => TreeGeometry::Capsule {
+                radius,
+                length: 2.0 * (z - radius / 2.0).max(0.0),
+            },
+            "cylinder" => TreeGeometry::Cylinder {
+                radius,
+                length: 2.0 * z,
+            },
+            "ellipsoid" => TreeGeometry::Ellipsoid { radii: [x, y, z] },
+            _ => TreeGeometry::Box {
+                size: [2.0 * x, 2.0 * y, 2.0 * z],
+            },
+        };
+        Some((geometry, Some(pose)))
+    }
+}
+
+/// Reads a primitive; with a pose if the geom is given by its ends. Returns `None` after it has
+/// reported a fault.
+fn primitive(
+    kind: &str,
+    geom: Node,
+    attributes: &Attributes<'_>,
+    reader: &mut Reader,
+) -> Option<Placed> {
+    let size: Vec<f64> = attributes
+        .get("size")
+        .unwrap_or_default()
+        .split_whitespace()
+        .filter_map(|word| word.parse().ok())
+        .collect();
+    let ends = match attributes.get("fromto") {
+        Some(text) if kind != "sphere" => Some(reader.numbers::<6>(geom, text, Bound::Finite)?),
+        _ => None,
+    };
+    let wanted = match (kind, ends) {
+        ("sphere", _) | (_, Some(_)) => 1,
+        ("cylinder" | "capsule", None) => 2,
+        _ => 3,
+    };
+    let is_possible = |number: &f64| number.is_finite() && *number > 0.0;
+    if size.len() < wanted || !size[..wanted].iter().all(is_possible) {
+        let message =
+            format!("a geom of the type {kind} needs {wanted} positive numbers in `size`");
+        let help = "sizes are radii and half lengths in metres";
+        reader.error("W034", geom, message, help);
+        return None;
+    }
+    let between = ends.map(between);
+    let [x, y, z] = match (&between, wanted) {
+        // Between its ends, a geom is as wide as it is deep.
+        (Some((_, half)), _) => [size[0], size[0], *half],
+        (None, 1) => [size[0]; 3],
+        (None, 2) => [size[0], size[0], size[1]],
+        (None, _) => [size[0], size[1], size[2]],
+    };
+    let geometry = match kind {
+        "sphere" => TreeGeometry::Sphere { radius: x },
+        "cylinder" => TreeGeometry::Cylinder {
+            radius: x,
+            length: 2.0 * z,
+        },
+        "capsule" => TreeGeometry::Capsule {
+            radius: x,
+            length: 2.0 * z,
+        },
+        "ellipsoid" => TreeGeometry::Ellipsoid { radii: [x, y, z] },
+        _ => TreeGeometry::Box {
+            size: [2.0 * x, 2.0 * y, 2.0 * z],
+        },
+    };
+    Some((geometry, between.map(|(pose, _)| pose)))
+}
+
+/// The pose of a geom between two points, and half of their distance.
+fn between([ax, ay, az, bx, by, bz]: [f64; 6]) -> (Isometry3<f64>, f64) {
+    let (a, b) = (Point3::new(ax, ay, az), Point3::new(bx, by, bz));
+    let turned = UnitQuaternion::rotation_between(&Vector3::z(), &(b - a))
+        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI));
+    let middle = Translation3::from(nalgebra::center(&a, &b).coords);
+    (Isometry3::from_parts(middle, turned), (b - a).norm() / 2.0)
 }

@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
-use crate::foreign::mjcf_compiler::Compiler;
+use crate::foreign::mjcf_compiler::{Compiler, Item};
 use crate::foreign::mjcf_couplings::{Couplings, Mimic, elements, not_linear};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 
@@ -211,12 +211,8 @@ impl BodyTree {
         let mut tree = Self::default();
         let mut unheard = Reader::new(reader.source);
         for worldbody in xml::children(root, "worldbody") {
-            tree.add(
-                worldbody,
-                (None, Isometry3::identity()),
-                None,
-                (compiler, &mut unheard),
-            );
+            let class = worldbody.attribute("childclass");
+            tree.add((worldbody, None, ""), class, (compiler, &mut unheard));
         }
         tree
     }
@@ -240,53 +236,48 @@ impl BodyTree {
         self.hinges.iter().map(|hinge| hinge.start).collect()
     }
 
+    /// Adds the bodies, joints and sites in a body; `suffix` ends their names.
     fn add(
         &mut self,
-        node: Node,
-        (body, shift): (Option<usize>, Isometry3<f64>),
+        (node, body, suffix): (Node, Option<usize>, &str),
         class: Option<&str>,
         (compiler, reader): (&Compiler, &mut Reader),
     ) {
-        for child in node.children().filter(Node::is_element) {
-            let attributes = compiler.attributes(child, class);
-            let own = child.attribute("childclass").or(class);
-            match child.tag_name().name() {
-                "frame" => {
-                    let shift = shift * compiler.pose(&attributes, child, reader);
-                    self.add(child, (body, shift), own, (compiler, reader));
-                }
-                "site" => {
-                    let Some(name) = child.attribute("name") else {
-                        continue;
-                    };
-                    let at = shift * compiler.pose(&attributes, child, reader);
-                    self.sites
-                        .insert(name.to_owned(), (body, at * Point3::origin()));
-                }
-                "body" => {
-                    let pose = shift * compiler.pose(&attributes, child, reader);
-                    let name = child.attribute("name").unwrap_or("body");
-                    let first = self.hinges.len();
-                    for joint in xml::children(child, "joint") {
-                        self.hinges
-                            .extend(hinge(joint, name, own, (compiler, reader)));
-                    }
-                    self.bodies.push(MjcfBody {
-                        parent: body,
-                        pose,
-                        hinges: (first..self.hinges.len()).collect(),
-                    });
-                    let idx = self.bodies.len() - 1;
-                    self.names.insert(name.to_owned(), idx);
-                    self.add(
-                        child,
-                        (Some(idx), Isometry3::identity()),
-                        own,
-                        (compiler, reader),
-                    );
-                }
-                _ => {}
+        let content = compiler.content(node, class, reader);
+        let items: Vec<Item<'_>> = content
+            .into_iter()
+            .map(|item| Item {
+                suffix: format!("{}{suffix}", item.suffix),
+                ..item
+            })
+            .collect();
+        for item in items.iter().filter(|item| item.is("site")) {
+            let attributes = compiler.attributes(item.node, item.class);
+            let at = item.shift * compiler.pose(&attributes, item.node, reader);
+            if let Some(name) = item.name() {
+                self.sites.insert(name, (body, at * Point3::origin()));
             }
+        }
+        if let Some(body) = body {
+            let name = format!("{}{suffix}", node.attribute("name").unwrap_or("body"));
+            let first = self.hinges.len();
+            for item in items.iter().filter(|item| item.is("joint")) {
+                self.hinges.extend(hinge(item, &name, (compiler, reader)));
+            }
+            self.bodies[body].hinges = (first..self.hinges.len()).collect();
+            self.names.insert(name, body);
+        }
+        for item in items.iter().filter(|item| item.is("body")) {
+            let attributes = compiler.attributes(item.node, item.class);
+            let pose = item.shift * compiler.pose(&attributes, item.node, reader);
+            self.bodies.push(MjcfBody {
+                parent: body,
+                pose,
+                hinges: Vec::new(),
+            });
+            let inside = (item.node, Some(self.bodies.len() - 1), item.suffix.as_str());
+            let class = item.node.attribute("childclass").or(item.class);
+            self.add(inside, class, (compiler, reader));
         }
     }
 
@@ -372,12 +363,12 @@ impl BodyTree {
 
 /// Reads a joint that turns or slides.
 fn hinge(
-    joint: Node,
+    item: &Item<'_>,
     body: &str,
-    class: Option<&str>,
     (compiler, reader): (&Compiler, &mut Reader),
 ) -> Option<Hinge> {
-    let attributes = compiler.attributes(joint, class);
+    let joint = item.node;
+    let attributes = compiler.attributes(joint, item.class);
     let kind = attributes.get("type").unwrap_or("hinge");
     let slides = kind == "slide";
     if !slides && kind != "hinge" {
@@ -403,11 +394,9 @@ fn hinge(
     };
     let unit = if slides { 1.0 } else { compiler.angle };
     Some(Hinge {
-        name: joint
-            .attribute("name")
-            .map_or_else(|| format!("{body}_joint"), str::to_owned),
-        axis: Unit::try_new(Vector3::from(axis), 1e-9)?,
-        at: Vector3::from(at),
+        name: item.name().unwrap_or_else(|| format!("{body}_joint")),
+        axis: Unit::try_new(item.shift.rotation * Vector3::from(axis), 1e-9)?,
+        at: (item.shift * Point3::from(at)).coords,
         slides,
         range: range
             .filter(|_| attributes.get("limited") != Some("false"))

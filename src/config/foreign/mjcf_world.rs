@@ -1,82 +1,88 @@
-//! Converts a world in MJCF to URDF, one object for each body.
+//! Reads a world in MJCF, one object for each body at its top.
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::rc::Rc;
 
 use nalgebra::Isometry3;
 
-use crate::foreign::mjcf::{Robot, unique, with_robot};
-use crate::foreign::urdf::Materials;
-use crate::foreign::xml::{self, Node};
+use crate::foreign::lookup::Lookup;
+use crate::foreign::mjcf::{Model, Purpose, unique, with_model};
+use crate::foreign::xml::{self, Node, Reader};
 use actcheck_base::{Diagnostics, Source};
+use actcheck_data::{ModelTree, TreeLink};
 
 /// A body, or a solid without a body, at the top of a world.
 pub(crate) struct Piece {
     pub(crate) name: String,
-    pub(crate) urdf: Source,
-    pub(crate) materials: Materials,
+    pub(crate) tree: ModelTree,
     /// Whether it can move freely.
     pub(crate) moves: bool,
 }
 
-/// Converts the text of a world, one object for each body at its top.
+/// Reads the text of a world, one object for each body at its top. Also returns the text with all
+/// included files, and warnings.
 ///
 /// # Errors
-/// Faults of the text: W031 to W036, W055.
+/// Faults of the text: W031 to W036, W051, W055.
 pub(crate) fn read(
     source: &Source,
     path: &Path,
-    files: &actcheck_base::Files,
-) -> Result<Vec<Piece>, Diagnostics> {
-    with_robot(source, path, files, |root, robot, reader| {
-        let mut pieces = Vec::new();
-        let Some(worldbody) = xml::child(root, "worldbody") else {
-            return pieces;
-        };
+    lookup: &Lookup,
+) -> Result<(Vec<Piece>, Source, Diagnostics), Diagnostics> {
+    let purpose = (Purpose::Object, 0);
+    with_model(source, path, lookup, purpose, |root, model, reader| {
         let mut names = BTreeMap::new();
-        let mut named = |written: Option<&str>, otherwise: &str| {
-            let mut name = unique(&mut names, written.unwrap_or(otherwise));
-            // Names are parts of names of models and locations.
-            name.retain(|letter| !letter.is_control() && letter != '/');
-            name
-        };
-        for body in xml::children(worldbody, "body") {
-            let free = |joint: &Node| {
-                joint.has_tag_name("freejoint") || joint.attribute("type") == Some("free")
-            };
-            let moves = body.children().any(|child| free(&child));
-            let mut own = robot.alone();
-            let world = own.unique("world");
-            own.out.link(&world, None, &[]);
-            own.body(body, &world, &Isometry3::identity(), None, reader);
-            pieces.push(own.piece(named(body.attribute("name"), "body"), reader.source, moves));
-        }
-        for geom in xml::children(worldbody, "geom") {
-            let mut own = robot.alone();
-            if let Some((pose, shape, _)) = own.solid(geom, &Isometry3::identity(), None, reader) {
-                own.out.link("solid", None, &[(pose, shape)]);
-                pieces.push(own.piece(
-                    named(geom.attribute("name"), "solid"),
-                    reader.source,
-                    false,
-                ));
-            }
-        }
-        pieces
+        let worlds = xml::children(root, "worldbody");
+        worlds
+            .flat_map(|world| pieces(world, &model, &mut names, reader))
+            .collect()
     })
 }
 
-impl Robot {
-    fn piece(self, name: String, source: &Source, moves: bool) -> Piece {
-        let urdf = Source::new(
-            format!("{} (`{name}` as URDF)", source.name),
-            self.out.finish(&name),
-        );
-        Piece {
+fn pieces(
+    worldbody: Node,
+    model: &Model,
+    names: &mut BTreeMap<String, u32>,
+    reader: &mut Reader,
+) -> Vec<Piece> {
+    let mut named = |written: Option<String>, otherwise: &str| {
+        let mut name = unique(names, written.as_deref().unwrap_or(otherwise));
+        // Names are parts of names of models and locations.
+        name.retain(|letter| !letter.is_control() && letter != '/');
+        name
+    };
+    let mut found = Vec::new();
+    let compiler = Rc::clone(&model.compiler);
+    for item in compiler.content(worldbody, worldbody.attribute("childclass"), reader) {
+        let mut own = model.alone();
+        let world = own.unique("world");
+        own.link(TreeLink::frame(world.clone(), reader.place(item.node)));
+        let (name, moves) = if item.is("geom") {
+            let at = Isometry3::identity();
+            let [solids, _] = own.geoms(std::slice::from_ref(&item), &at, reader);
+            if solids.is_empty() {
+                continue;
+            }
+            own.tree.links[0].solids = solids;
+            (named(item.name(), "solid"), false)
+        } else if item.is("body") {
+            let free = |joint: &Node| {
+                joint.has_tag_name("freejoint") || joint.attribute("type") == Some("free")
+            };
+            let moves = item.node.children().any(|child| free(&child));
+            own.body(&item, &world, &item.shift, reader);
+            (named(item.name(), "body"), moves)
+        } else {
+            continue;
+        };
+        own.weigh(reader);
+        own.tree.name.clone_from(&name);
+        found.push(Piece {
             name,
-            urdf,
-            materials: self.materials.unwrap_or_default(),
+            tree: own.tree,
             moves,
-        }
+        });
     }
+    found
 }

@@ -96,7 +96,7 @@ impl<'a> Links<'a> {
 
     /// Returns the bodies that the links form. Nothing moves in furniture of a world and in a
     /// static model. After a fault, all links are one body.
-    pub(crate) fn assembly(&self, role: Role, fixed: bool, reader: &mut Reader) -> Assembly<'a> {
+    pub(crate) fn assembly(&self, role: Role, fixed: bool, reader: &mut Reader) -> Assembly {
         let mut joins = Vec::new();
         for (joint, at) in &self.joints {
             let is_fixed = joint.attribute("type") == Some("fixed");
@@ -109,7 +109,7 @@ impl<'a> Links<'a> {
                 joins.extend(self.join(*joint, is_fixed, at, reader));
             }
         }
-        Assembly::of(self.links.len(), &joins, reader)
+        Assembly::of(self.links.len(), &joins, &mut reader.found)
     }
 
     /// Returns whether a joint that does not move ties the model to the world.
@@ -128,7 +128,7 @@ impl<'a> Links<'a> {
         is_fixed: bool,
         model: &Isometry3<f64>,
         reader: &mut Reader,
-    ) -> Option<Join<'a>> {
+    ) -> Option<Join> {
         let (parent, child) = (
             self.end(joint, "parent", reader),
             self.end(joint, "child", reader),
@@ -136,7 +136,7 @@ impl<'a> Links<'a> {
         if is_fixed || sdf_joint::is_rigid(joint) {
             // Included models, and the world, are part of the object itself.
             return Some(Join {
-                node: joint,
+                place: reader.place(joint),
                 parent: parent?,
                 child: child?,
                 joint: None,
@@ -164,7 +164,7 @@ impl<'a> Links<'a> {
             return None;
         };
         Some(Join {
-            node: joint,
+            place: reader.place(joint),
             parent,
             child,
             joint: Some(moves),

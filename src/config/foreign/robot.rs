@@ -1,4 +1,4 @@
-//! Validates the text of a robot's URDF and reads its collision meshes.
+//! Reads a robot's file, of whatever format, as a tree, with its collision meshes.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,111 +6,141 @@ use std::path::Path;
 use crate::foreign::geometry::Shapes;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::robot_inertia::{self, Mend};
-use crate::foreign::robot_shapes;
-use crate::foreign::robot_text::{self, Edit};
-use crate::foreign::robot_tree::{self, Tree};
-use crate::foreign::xml::{self, Node, Reader};
+use crate::foreign::urdf_tree::{self, UrdfTree};
+use crate::foreign::xml::{self, Reader};
+use crate::foreign::{mjcf, robot_shapes, root_name, sdf_robot, tree_checks};
 use actcheck_base::{Diagnostics, Source};
-use actcheck_data::Shape;
+use actcheck_data::{ModelTree, Shape};
 
-/// The parts of a URDF that a profile needs.
-pub(crate) struct RobotText {
-    /// Meshes by their file name in the URDF.
+/// A robot as its file states it.
+pub(crate) struct RobotFile {
+    pub(crate) tree: ModelTree,
+    /// Meshes by their file name in the tree.
     pub(crate) meshes: BTreeMap<String, Vec<Shape>>,
     /// Digest of the mesh files.
     pub(crate) digest: String,
-    /// Its links and joints; `None` if the text is not a URDF or has no links.
-    pub(crate) tree: Option<Tree>,
-    /// Proposed changes of impossible moments of inertia.
+    /// The text with all that it includes.
+    pub(crate) text: Source,
+    /// Proposed changes of impossible moments of inertia; only for URDF.
     pub(crate) mends: Vec<Mend>,
-    /// Collision shapes for the links of the gripper, if they have none, and repairs.
-    pub(crate) edits: Vec<Edit>,
+    is_urdf: bool,
 }
 
-/// Reads the links, joints and collision meshes, and reports every fault with its span.
+impl RobotFile {
+    /// Returns the robot in URDF: its own text, or its tree in this form.
+    pub(crate) fn urdf(&self) -> Source {
+        if self.is_urdf {
+            self.text.clone()
+        } else {
+            Source::new(format!("{} (as URDF)", self.text.name), self.tree.to_urdf())
+        }
+    }
+}
+
+/// A tree before its shapes are read.
+struct Bare {
+    tree: ModelTree,
+    text: Source,
+    /// Faults of shapes that are only seen.
+    faults_of_visuals: BTreeMap<String, Diagnostics>,
+    is_urdf: bool,
+}
+
+/// Reads the links, joints and collision meshes, and reports every fault with its place. Returns
+/// `None` if the text has no tree.
 pub(crate) fn read(
     source: &Source,
     path: &Path,
     lookup: &Lookup,
     found: &mut Diagnostics,
-) -> RobotText {
-    let mut shapes = Shapes::new(lookup, path);
-    let mut meshes = BTreeMap::new();
-    let document = match xml::parse_model(source, &source.text) {
-        Ok(document) => document,
+) -> Option<RobotFile> {
+    let bare = match root_name(&source.text) {
+        Some("mujoco") => mjcf::robot(source, path, lookup).map(|(tree, text, said)| {
+            found.extend(said);
+            (tree, text, BTreeMap::new(), false)
+        }),
+        Some("sdf") => {
+            sdf_robot::tree(source).map(|tree| (tree, source.clone(), BTreeMap::new(), false))
+        }
+        _ => urdf(source, found)
+            .map(|read| (read.tree, source.clone(), read.faults_of_visuals, true)),
+    };
+    let (tree, text, faults_of_visuals, is_urdf) = match bare {
+        Ok(bare) => bare,
         Err(faults) => {
             found.extend(faults);
-            return RobotText {
-                meshes,
-                digest: shapes.digest.finish(),
-                tree: None,
-                mends: Vec::new(),
-                edits: Vec::new(),
-            };
+            return None;
         }
     };
+    let bare = Bare {
+        tree,
+        text,
+        faults_of_visuals,
+        is_urdf,
+    };
+    (!bare.tree.links.is_empty()).then(|| complete(bare, path, lookup, found))
+}
+
+/// Reads the tree of a text of URDF.
+///
+/// # Errors
+/// As [`read`], but for meshes and masses.
+pub(crate) fn tree_of_urdf(source: &Source) -> Result<ModelTree, Diagnostics> {
+    let mut found = Diagnostics::new();
+    let read = urdf(source, &mut found)?;
+    found.or(read.tree)
+}
+
+/// Reads a text of URDF; a tree without links after a fault of its root.
+fn urdf(source: &Source, found: &mut Diagnostics) -> Result<UrdfTree, Diagnostics> {
+    let document = xml::parse_model(source, &source.text)?;
     let mut reader = Reader::new(source);
     let root = document.root_element();
-    let tree = if root.tag_name().name() == "robot" {
-        Some(robot_tree::read(root, &mut reader)).filter(|tree| !tree.links.is_empty())
+    let read = if root.tag_name().name() == "robot" {
+        urdf_tree::read(root, &mut reader)
     } else {
         let message = format!(
             "the root is `<{}>` instead of `<robot>`",
             root.tag_name().name()
         );
-        reader.error(
-            "W032",
-            root,
-            message,
-            "a URDF file begins with `<robot name=\"…\">`",
-        );
-        None
+        let help = "a URDF file begins with `<robot name=\"…\">`";
+        reader.error("W032", root, message, help);
+        UrdfTree {
+            tree: ModelTree::default(),
+            faults_of_visuals: BTreeMap::new(),
+        }
     };
-    for link in xml::children(root, "link") {
-        for collision in
-            xml::children(link, "collision").filter(|one| robot_text::placeholder(*one).is_none())
-        {
-            read_collision(collision, &mut shapes, &mut meshes, &mut reader);
-        }
-    }
-    let mut edits = robot_text::repairs(root, &mut reader);
-    for change in robot_shapes::of_gripper(root, &mut reader) {
-        if let Some(seen) = change.seen {
-            read_collision(seen, &mut shapes, &mut meshes, &mut reader);
-        }
-        edits.push(change.edit);
-    }
-    let mends = robot_inertia::check(root, &meshes, &mut reader);
     found.extend(reader.found);
-    RobotText {
-        meshes,
-        digest: shapes.digest.finish(),
-        tree,
-        mends,
-        edits,
-    }
+    Ok(read)
 }
 
-fn read_collision(
-    collision: Node,
-    shapes: &mut Shapes,
-    meshes: &mut BTreeMap<String, Vec<Shape>>,
-    reader: &mut Reader,
-) {
-    let Some(geometry) = reader.required(collision, "geometry") else {
-        return;
-    };
-    let Some(mesh) = xml::child(geometry, "mesh") else {
-        // Primitives are created with the robot; this only validates their numbers.
-        shapes.urdf(geometry, reader);
-        return;
-    };
-    let Some(name) = reader.attribute(mesh, "filename") else {
-        return;
-    };
-    if !meshes.contains_key(name)
-        && let Some(shape) = shapes.mesh(mesh, name, [1.0; 3], reader)
-    {
-        meshes.insert(name.to_owned(), vec![shape]);
+/// Reads the collision meshes of a tree, and checks it.
+fn complete(mut bare: Bare, path: &Path, lookup: &Lookup, found: &mut Diagnostics) -> RobotFile {
+    let tree = &mut bare.tree;
+    tree_checks::check(tree, found);
+    robot_shapes::complete_gripper(tree, &mut bare.faults_of_visuals, found);
+    let mut shapes = Shapes::new(lookup, path);
+    let mut meshes = BTreeMap::new();
+    for link in &tree.links {
+        for solid in &link.solids {
+            shapes.load(solid, tree, &mut meshes, found);
+        }
+    }
+    if !bare.is_urdf {
+        // The masses may follow from meshes that are only seen.
+        let masses = tree.links.iter().map(|link| &link.inertial);
+        for mass in masses.flatten() {
+            let numbers = format!("{} {} {}", mass.kg, mass.pose, mass.about_com);
+            shapes.digest.update(numbers.as_bytes());
+        }
+    }
+    let mends = robot_inertia::check(tree, &meshes, found);
+    RobotFile {
+        meshes,
+        digest: shapes.digest.finish(),
+        text: bare.text,
+        mends: if bare.is_urdf { mends } else { Vec::new() },
+        tree: bare.tree,
+        is_urdf: bare.is_urdf,
     }
 }

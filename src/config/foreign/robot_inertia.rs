@@ -5,10 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use crate::foreign::body::is_possible;
-use crate::foreign::urdf::origin;
-use crate::foreign::xml::{self, Bound, Node, Reader};
-use actcheck_base::Span;
-use actcheck_data::{LEAST_LINK_KG, Part, Pose, Shape, bounds};
+use crate::foreign::xml;
+use actcheck_base::{Diagnostic, Diagnostics, Span};
+use actcheck_data::{
+    LEAST_LINK_KG, ModelTree, Part, Pose, Shape, TreeGeometry, TreeInertial, TreeLink, TreeMotion,
+    bounds,
+};
 
 /// Density of a link without a shape: that of water. Unit: kg/m³.
 const DENSITY: f64 = 1000.0;
@@ -31,22 +33,18 @@ pub(crate) struct Mend {
 /// the sum of the others (W036). Links that are fixed to each other are one body, as in the
 /// simulation. Returns the proposed changes. `meshes` are the solids by mesh file.
 pub(crate) fn check(
-    root: Node,
+    tree: &ModelTree,
     meshes: &BTreeMap<String, Vec<Shape>>,
-    reader: &mut Reader,
+    found: &mut Diagnostics,
 ) -> Vec<Mend> {
-    let links: BTreeMap<&str, Node> = xml::children(root, "link")
-        .filter_map(|link| Some((link.attribute("name")?, link)))
-        .collect();
     let mut mends = Vec::new();
-    for joint in
-        xml::children(root, "joint").filter(|joint| joint.attribute("type") != Some("fixed"))
+    for joint in tree
+        .joints
+        .iter()
+        .filter(|joint| joint.motion != TreeMotion::Fixed)
     {
-        let Some(moved) = end(joint, "child") else {
-            continue;
-        };
-        let masses = masses_of_body(root, moved, &links, reader);
-        if masses.iter().map(|mass| mass.kg).sum::<f64>() < LEAST_LINK_KG {
+        let masses = masses_of_body(tree, &joint.child);
+        if masses.iter().map(|mass| mass.stated.kg).sum::<f64>() < LEAST_LINK_KG {
             continue;
         }
         let whole = together(&masses);
@@ -54,108 +52,66 @@ pub(crate) fn check(
             continue;
         }
         let massless = whole.symmetric_eigenvalues().min() <= 0.0;
-        for mass in masses.iter().filter(|mass| !is_possible(&mass.about_com)) {
-            mends.push(report(mass, moved, massless, meshes, reader));
+        let impossible = |mass: &&LinkMass| !is_possible(&mass.stated.about_com);
+        for mass in masses.iter().filter(impossible) {
+            mends.push(report(mass, &joint.child, massless, meshes, found));
         }
     }
     mends
 }
 
 /// The mass of one link of a body.
-struct LinkMass<'n> {
-    link: Node<'n>,
-    inertial: Node<'n>,
-    kg: f64,
-    /// Pose of the `<inertial>` in the frame of the body.
+struct LinkMass<'a> {
+    link: &'a TreeLink,
+    stated: &'a TreeInertial,
+    /// Pose of the mass in the frame of the body.
     at: Isometry3<f64>,
-    /// Inertia tensor along the axes of the `<inertial>`.
-    about_com: Matrix3<f64>,
 }
 
 /// Returns the masses of a link and of all links that are fixed to it.
-fn masses_of_body<'n>(
-    root: Node<'n>,
-    moved: &'n str,
-    links: &BTreeMap<&str, Node<'n>>,
-    reader: &mut Reader,
-) -> Vec<LinkMass<'n>> {
-    let fixed: Vec<Node> = xml::children(root, "joint")
-        .filter(|joint| joint.attribute("type") == Some("fixed"))
-        .collect();
+fn masses_of_body<'a>(tree: &'a ModelTree, moved: &'a str) -> Vec<LinkMass<'a>> {
+    let fixed = || {
+        tree.joints
+            .iter()
+            .filter(|joint| joint.motion == TreeMotion::Fixed)
+    };
     let mut masses = Vec::new();
     let mut seen = BTreeSet::from([moved]);
     let mut open = vec![(moved, Isometry3::identity())];
     while let Some((name, at)) = open.pop() {
+        let link = tree.link(name);
+        let stated = link.and_then(|link| Some((link, link.inertial.as_ref()?)));
         masses.extend(
-            links
-                .get(name)
-                .and_then(|link| read_mass(*link, &at, reader)),
+            stated
+                .filter(|(_, stated)| stated.kg > 0.0)
+                .map(|(link, stated)| LinkMass {
+                    link,
+                    stated,
+                    at: at * stated.pose,
+                }),
         );
-        for joint in fixed
-            .iter()
-            .filter(|joint| end(**joint, "parent") == Some(name))
-        {
-            let Some(child) = end(*joint, "child").filter(|child| seen.insert(child)) else {
-                continue;
-            };
-            open.extend(origin(*joint, reader).map(|origin| (child, at * origin)));
+        for joint in fixed().filter(|joint| joint.parent == name) {
+            if seen.insert(&joint.child) {
+                open.push((&joint.child, at * joint.origin));
+            }
         }
     }
     masses
 }
 
-fn end<'n>(joint: Node<'n>, which: &str) -> Option<&'n str> {
-    xml::child(joint, which)?.attribute("link")
-}
-
-/// Reads the mass of a link; `None` if it has none. Moments that are missing are 0.
-fn read_mass<'n>(link: Node<'n>, at: &Isometry3<f64>, reader: &mut Reader) -> Option<LinkMass<'n>> {
-    let inertial = xml::child(link, "inertial")?;
-    let kg: f64 = xml::child(inertial, "mass")?
-        .attribute("value")?
-        .trim()
-        .parse()
-        .ok()?;
-    if !(kg.is_finite() && kg > 0.0) {
-        return None;
-    }
-    let at = at * origin(inertial, reader)?;
-    let about_com = match xml::child(inertial, "inertia") {
-        None => Matrix3::zeros(),
-        Some(inertia) => {
-            let mut entry = |name: &str| match inertia.attribute(name) {
-                None => Some(0.0),
-                Some(written) => reader
-                    .numbers::<1>(inertia, written, Bound::Finite)
-                    .map(|[number]| number),
-            };
-            let (xx, xy, xz) = (entry("ixx")?, entry("ixy")?, entry("ixz")?);
-            let (yy, yz, zz) = (entry("iyy")?, entry("iyz")?, entry("izz")?);
-            Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
-        }
-    };
-    Some(LinkMass {
-        link,
-        inertial,
-        kg,
-        at,
-        about_com,
-    })
-}
-
 /// The inertia tensor of all masses about their common centre, by the parallel axis theorem.
 fn together(masses: &[LinkMass]) -> Matrix3<f64> {
-    let total: f64 = masses.iter().map(|mass| mass.kg).sum();
+    let total: f64 = masses.iter().map(|mass| mass.stated.kg).sum();
     let com = masses
         .iter()
-        .map(|mass| mass.at.translation.vector * mass.kg)
+        .map(|mass| mass.at.translation.vector * mass.stated.kg)
         .sum::<Vector3<f64>>()
         / total;
     let about = |mass: &LinkMass| {
         let arm = mass.at.translation.vector - com;
         let turned = mass.at.rotation.to_rotation_matrix();
-        let own = turned.matrix() * mass.about_com * turned.matrix().transpose();
-        own + (Matrix3::identity() * arm.norm_squared() - arm * arm.transpose()) * mass.kg
+        let own = turned.matrix() * mass.stated.about_com * turned.matrix().transpose();
+        own + (Matrix3::identity() * arm.norm_squared() - arm * arm.transpose()) * mass.stated.kg
     };
     masses.iter().map(about).sum()
 }
@@ -166,10 +122,11 @@ fn report(
     moved: &str,
     massless: bool,
     meshes: &BTreeMap<String, Vec<Shape>>,
-    reader: &mut Reader,
+    found: &mut Diagnostics,
 ) -> Mend {
-    let name = mass.link.attribute("name").unwrap_or_default();
+    let name = &mass.link.name;
     let mut principal: Vec<f64> = mass
+        .stated
         .about_com
         .symmetric_eigenvalues()
         .iter()
@@ -181,44 +138,39 @@ fn report(
         .map(|moment| short(*moment))
         .collect::<Vec<_>>()
         .join(", ");
-    let moves = match name == moved {
+    let moves = match *name == moved {
         true => "moves".to_owned(),
         false => format!("moves with `{moved}`"),
     };
-    let proposed = Proposal::new(mass, meshes, reader);
+    let proposed = Proposal::new(mass, meshes);
     let element = proposed.element();
-    let node = xml::child(mass.inertial, "inertia").unwrap_or(mass.inertial);
+    let place = mass.stated.moments_place.as_ref();
+    let place = place.unwrap_or(&mass.stated.place);
     let help = format!(
         "write those of {}: `{element}`; `actcheck check --mend` writes a mended copy",
         proposed.origin
     );
     let says = format!(
         "the link `{name}` of {} kg {moves}, but its principal moments of inertia are {numbers} kg·m²",
-        mass.kg
+        mass.stated.kg
     );
-    if massless {
-        reader.error("W034", node, format!("{says}: all must be above 0"), help);
+    let fault = if massless {
+        Diagnostic::error("W034", format!("{says}: all must be above 0"))
     } else {
-        reader.warning(
-            "W036",
-            node,
-            format!("{says}: no body has one above the sum of the others"),
-            help,
-        );
-    }
+        let message = format!("{says}: no body has one above the sum of the others");
+        Diagnostic::warning("W036", message)
+    };
+    found.push(fault.at(&place.source, xml::tag(place)).help(help));
     let change = format!(
         "`{name}` has the moments of inertia of {} instead of {numbers} kg·m²",
         proposed.origin
     );
-    let (span, text) = match xml::child(mass.inertial, "inertia") {
-        Some(inertia) => (inertia.range(), element),
-        // After `<mass …/>`, which exists: it was read.
-        None => {
-            let after = xml::child(mass.inertial, "mass")
-                .map_or(mass.inertial.range().end, |node| node.range().end);
-            (after..after, element)
-        }
+    // Missing moments are inserted after `<mass …/>`.
+    let span = match &mass.stated.moments_place {
+        Some(inertia) => inertia.span.clone(),
+        None => mass.stated.place.span.end..mass.stated.place.span.end,
     };
+    let text = element;
     Mend { span, text, change }
 }
 
@@ -231,8 +183,9 @@ struct Proposal {
 }
 
 impl Proposal {
-    fn new(mass: &LinkMass, meshes: &BTreeMap<String, Vec<Shape>>, reader: &mut Reader) -> Self {
-        let (size, origin) = match size_of(mass, meshes, reader) {
+    fn new(mass: &LinkMass, meshes: &BTreeMap<String, Vec<Shape>>) -> Self {
+        let kg = mass.stated.kg;
+        let (size, origin) = match size_of(mass, meshes) {
             Some(size) => {
                 let [x, y, z] = size.map(|side| short(100.0 * side));
                 (
@@ -241,7 +194,7 @@ impl Proposal {
                 )
             }
             None => {
-                let side = (mass.kg / DENSITY).cbrt();
+                let side = (kg / DENSITY).cbrt();
                 (
                     [side; 3],
                     format!(
@@ -251,7 +204,7 @@ impl Proposal {
                 )
             }
         };
-        let [x, y, z] = size.map(|side| side.max(LEAST_SIDE_M).powi(2) * mass.kg / 12.0);
+        let [x, y, z] = size.map(|side| side.max(LEAST_SIDE_M).powi(2) * kg / 12.0);
         Self {
             moments: [y + z, x + z, x + y],
             origin,
@@ -264,20 +217,13 @@ impl Proposal {
     }
 }
 
-/// The sides of the box around a link's collision shapes, along the axes of its `<inertial>`.
-/// Faults of these shapes are reported elsewhere. Unit: metres.
-fn size_of(
-    mass: &LinkMass,
-    meshes: &BTreeMap<String, Vec<Shape>>,
-    reader: &Reader,
-) -> Option<[f64; 3]> {
-    let mut silent = Reader::new(reader.source);
-    let link_from_inertial = origin(mass.inertial, &mut silent)?;
+/// The sides of the box around a link's collision shapes, along the axes of its mass. Unit: metres.
+fn size_of(mass: &LinkMass, meshes: &BTreeMap<String, Vec<Shape>>) -> Option<[f64; 3]> {
+    let mass_from_link = mass.stated.pose.inverse();
     let mut parts: Vec<Part> = Vec::new();
-    for collision in xml::children(mass.link, "collision") {
-        let pose =
-            Pose::from_isometry(&(link_from_inertial.inverse() * origin(collision, &mut silent)?));
-        let shapes = shapes_of(xml::child(collision, "geometry")?, meshes)?;
+    for solid in &mass.link.solids {
+        let pose = Pose::from_isometry(&(mass_from_link * solid.pose));
+        let shapes = shapes_of(&solid.geometry, meshes)?;
         parts.extend(shapes.into_iter().map(|shape| Part { pose, shape }));
     }
     let (low, high) = bounds(&parts);
@@ -285,41 +231,14 @@ fn size_of(
     (!parts.is_empty() && size.iter().all(|side| side.is_finite())).then(|| size.into())
 }
 
-fn shapes_of(geometry: Node, meshes: &BTreeMap<String, Vec<Shape>>) -> Option<Vec<Shape>> {
-    let kind = geometry.children().find(Node::is_element)?;
-    let numbers = |key: &str| -> Option<Vec<f64>> {
-        kind.attribute(key)?
-            .split_whitespace()
-            .map(|number| number.parse().ok())
-            .collect()
-    };
-    let number = |key: &str| numbers(key)?.first().copied();
-    Some(match kind.tag_name().name() {
-        "box" => vec![Shape::Box {
-            size: numbers("size")?.try_into().ok()?,
-        }],
-        "cylinder" => vec![Shape::Cylinder {
-            radius: number("radius")?,
-            height: number("length")?,
-        }],
-        "capsule" => vec![Shape::Capsule {
-            radius: number("radius")?,
-            height: number("length")?,
-        }],
-        "sphere" => vec![Shape::Sphere {
-            radius: number("radius")?,
-        }],
-        "mesh" => {
-            let scale = numbers("scale")
-                .and_then(|scale| scale.try_into().ok())
-                .unwrap_or([1.0; 3]);
-            meshes
-                .get(kind.attribute("filename")?)?
-                .iter()
-                .map(|shape| shape.scaled(scale))
-                .collect()
-        }
-        _ => return None,
+fn shapes_of(geometry: &TreeGeometry, meshes: &BTreeMap<String, Vec<Shape>>) -> Option<Vec<Shape>> {
+    Some(match geometry {
+        TreeGeometry::Mesh { file, scale } => meshes
+            .get(file)?
+            .iter()
+            .map(|shape| shape.scaled(*scale))
+            .collect(),
+        primitive => vec![primitive.solid()?],
     })
 }
 
@@ -335,7 +254,8 @@ fn short(number: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::foreign::xml::parse_model;
+    use crate::foreign::urdf_tree;
+    use crate::foreign::xml::{Reader, parse_model};
     use actcheck_base::Source;
 
     /// Codes and mends of a robot whose moving link has this content, with a link that is fixed to
@@ -350,8 +270,10 @@ mod tests {
         let source = Source::new("r.urdf", text);
         let document = parse_model(&source, &source.text).expect("it is XML");
         let mut reader = Reader::new(&source);
-        let mends = check(document.root_element(), &BTreeMap::new(), &mut reader);
-        (reader.found.iter().map(|fault| fault.code).collect(), mends)
+        let tree = urdf_tree::read(document.root_element(), &mut reader).tree;
+        let mut found = Diagnostics::new();
+        let mends = check(&tree, &BTreeMap::new(), &mut found);
+        (found.iter().map(|fault| fault.code).collect(), mends)
     }
 
     fn inertial(kg: f64, [xx, yy, zz]: [f64; 3]) -> String {

@@ -171,7 +171,7 @@ pub(crate) fn read_model(
         .iter()
         .map(|(link, _)| link.attribute("name").unwrap_or_default())
         .collect();
-    let mut body = assembly.attach(bodies, &names, reader);
+    let mut body = assembly.attach(bodies, &names, &mut reader.found);
     links.read_included(role, &mut body, shapes, reader);
     if body.parts.is_empty() && role == Role::Object && !reader.found.has_errors() {
         let message =

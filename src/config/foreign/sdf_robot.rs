@@ -1,4 +1,4 @@
-//! Converts a robot in SDF, Gazebo's format, to URDF: links, joints, collisions and inertias of one
+//! Reads a robot in SDF, Gazebo's format: links, joints, collisions and inertias of one
 //! model.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -8,9 +8,11 @@ use nalgebra::{Isometry3, Matrix3};
 use crate::foreign::sdf::check_version;
 use crate::foreign::sdf_joint;
 use crate::foreign::sdf_pose::pose;
-use crate::foreign::urdf_text::{Inertial, UrdfJoint, UrdfText, escaped};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostics, Source, did_you_mean};
+use actcheck_data::{
+    ModelTree, TreeGeometry, TreeInertial, TreeJoint, TreeLink, TreeMimic, TreeMotion, TreeSolid,
+};
 
 /// Limits beyond this are none. Units: metres or radians.
 const UNLIMITED: f64 = 1e6;
@@ -20,23 +22,20 @@ const SLIDES_M: f64 = 10.0;
 const EFFORT: f64 = 100.0;
 const VELOCITY: f64 = 2.0;
 
-/// Converts a text.
+/// Reads the tree of a text.
 ///
 /// # Errors
 /// Faults of the text: W031 to W035, W051, W055.
-pub(crate) fn to_urdf(source: &Source) -> Result<Source, Diagnostics> {
+pub(crate) fn tree(source: &Source) -> Result<ModelTree, Diagnostics> {
     let document = xml::parse_model(source, &source.text)?;
     let mut reader = Reader::new(source);
     let root = document.root_element();
-    let text = convert(root, &mut reader);
+    let tree = convert(root, &mut reader);
     reader.found.or(())?;
-    Ok(Source::new(
-        format!("{} (as URDF)", source.name),
-        text.unwrap_or_default(),
-    ))
+    Ok(tree.unwrap_or_default())
 }
 
-fn convert(root: Node, reader: &mut Reader) -> Option<String> {
+fn convert(root: Node, reader: &mut Reader) -> Option<ModelTree> {
     check_version(root, reader)?;
     let models = root
         .descendants()
@@ -85,22 +84,24 @@ fn convert(root: Node, reader: &mut Reader) -> Option<String> {
         }
         joints.push((joint, parent, child));
     }
-    let mut out = UrdfText::default();
+    let mut out = ModelTree {
+        name: model.attribute("name").unwrap_or("robot").to_owned(),
+        ..ModelTree::default()
+    };
     for (name, (link, at)) in &links {
         let shift = frames[name].inverse() * at;
-        write_link(*link, name, &shift, &mut out, reader)?;
+        out.links.push(read_link(*link, name, &shift, reader)?);
     }
     for (joint, parent, child) in &joints {
-        write_joint(
+        out.joints.push(read_joint(
             *joint,
-            (parent, child),
-            (&frames[parent], &frames[child]),
-            &mut out,
+            [parent, child],
+            [&frames[parent], &frames[child]],
             reader,
-        )?;
+        )?);
     }
     tie_roots(&links, &joints, &frames, &mut out);
-    Some(out.finish(model.attribute("name").unwrap_or("robot")))
+    Some(out)
 }
 
 /// Links without a joint above them are fixed to the first of them, as parts of the same base.
@@ -108,7 +109,7 @@ fn tie_roots(
     links: &BTreeMap<&str, (Node, Isometry3<f64>)>,
     joints: &[(Node, &str, &str)],
     frames: &BTreeMap<&str, Isometry3<f64>>,
-    out: &mut UrdfText,
+    out: &mut ModelTree,
 ) {
     let moved: BTreeSet<&str> = joints.iter().map(|(.., child)| *child).collect();
     // The one with the most joints below it is the robot.
@@ -130,11 +131,12 @@ fn tie_roots(
     };
     for other in others {
         let origin = frames[root].inverse() * frames[other];
-        out.joint(&UrdfJoint::fixed(
-            &format!("{other}_fixed"),
-            root,
-            other,
+        let place = out.link(other).map(|link| link.place.clone());
+        out.joints.push(TreeJoint::fixed(
+            format!("{other}_fixed"),
+            [root, other],
             origin,
+            place.unwrap_or_default(),
         ));
     }
 }
@@ -143,28 +145,38 @@ fn end<'a>(joint: Node<'a>, which: &str, reader: &mut Reader) -> Option<&'a str>
     reader.required(joint, which).map(xml::text)
 }
 
-fn write_link(
+fn read_link(
     link: Node,
     name: &str,
     shift: &Isometry3<f64>,
-    out: &mut UrdfText,
     reader: &mut Reader,
-) -> Option<()> {
+) -> Option<TreeLink> {
     let mut solids = Vec::new();
     for collision in xml::children(link, "collision") {
         let at = shift * pose(collision, reader)?;
         let geometry = reader.required(collision, "geometry")?;
-        solids.push((at, shape(geometry, reader)?));
+        solids.push(TreeSolid {
+            pose: at,
+            geometry: shape(geometry, reader)?,
+            matter: None,
+            friction: None,
+            place: reader.place(collision),
+        });
     }
     let inertial = match xml::child(link, "inertial") {
         Some(node) => Some(inertial(node, shift, reader)?),
         None => None,
     };
-    out.link(name, inertial.as_ref(), &solids);
-    Some(())
+    Some(TreeLink {
+        name: name.to_owned(),
+        inertial,
+        solids,
+        visuals: Vec::new(),
+        place: reader.place(link),
+    })
 }
 
-fn inertial(node: Node, shift: &Isometry3<f64>, reader: &mut Reader) -> Option<Inertial> {
+fn inertial(node: Node, shift: &Isometry3<f64>, reader: &mut Reader) -> Option<TreeInertial> {
     let at = shift * pose(node, reader)?;
     let kg = match xml::child(node, "mass") {
         Some(mass) => reader.number(mass, Bound::Mass)?,
@@ -188,15 +200,18 @@ fn inertial(node: Node, shift: &Isometry3<f64>, reader: &mut Reader) -> Option<I
             about_com[(column, row)] = value;
         }
     }
-    Some(Inertial {
+    let inertia = xml::child(node, "inertia");
+    Some(TreeInertial {
         pose: at,
         kg,
         about_com,
+        place: reader.place(xml::child(node, "mass").unwrap_or(node)),
+        moments_place: inertia.map(|inertia| reader.place(inertia)),
     })
 }
 
-/// The element of a `<geometry>` in URDF.
-fn shape(geometry: Node, reader: &mut Reader) -> Option<String> {
+/// Reads the shape of a `<geometry>`.
+fn shape(geometry: Node, reader: &mut Reader) -> Option<TreeGeometry> {
     let Some(kind) = geometry.children().find(Node::is_element) else {
         reader.error(
             "W033",
@@ -211,34 +226,36 @@ fn shape(geometry: Node, reader: &mut Reader) -> Option<String> {
         reader.number(node, Bound::Length)
     };
     Some(match kind.tag_name().name() {
-        "sphere" => format!("<sphere radius=\"{}\"/>", number("radius")?),
-        round @ ("cylinder" | "capsule") => {
-            format!(
-                "<{round} radius=\"{}\" length=\"{}\"/>",
-                number("radius")?,
-                number("length")?
-            )
-        }
+        "sphere" => TreeGeometry::Sphere {
+            radius: number("radius")?,
+        },
+        "cylinder" => TreeGeometry::Cylinder {
+            radius: number("radius")?,
+            length: number("length")?,
+        },
+        "capsule" => TreeGeometry::Capsule {
+            radius: number("radius")?,
+            length: number("length")?,
+        },
         "box" => {
             let size = reader.required(kind, "size")?;
-            let [x, y, z] = reader.numbers(size, xml::text(size), Bound::Length)?;
-            format!("<box size=\"{x} {y} {z}\"/>")
+            TreeGeometry::Box {
+                size: reader.numbers(size, xml::text(size), Bound::Length)?,
+            }
         }
         "ellipsoid" => {
             let radii = reader.required(kind, "radii")?;
-            let [x, y, z] = reader
-                .numbers(radii, xml::text(radii), Bound::Length)?
-                .map(|radius| 2.0 * radius);
-            format!("<box size=\"{x} {y} {z}\"/>")
+            TreeGeometry::Ellipsoid {
+                radii: reader.numbers(radii, xml::text(radii), Bound::Length)?,
+            }
         }
         "mesh" => {
-            let uri = reader.required(kind, "uri").map(xml::text)?;
-            let scale = xml::child(kind, "scale").map_or("1 1 1", xml::text);
-            format!(
-                "<mesh filename=\"{}\" scale=\"{}\"/>",
-                escaped(uri),
-                escaped(scale)
-            )
+            let file = reader.required(kind, "uri").map(xml::text)?.to_owned();
+            let scale = match xml::child(kind, "scale") {
+                Some(scale) => reader.numbers(scale, xml::text(scale), Bound::Finite)?,
+                None => [1.0; 3],
+            };
+            TreeGeometry::Mesh { file, scale }
         }
         other => {
             let message = format!("the shape {other} can't be part of a robot");
@@ -253,23 +270,20 @@ fn shape(geometry: Node, reader: &mut Reader) -> Option<String> {
     })
 }
 
-fn write_joint(
+fn read_joint(
     joint: Node,
-    (parent, child): (&str, &str),
-    (from, to): (&Isometry3<f64>, &Isometry3<f64>),
-    out: &mut UrdfText,
+    ends: [&str; 2],
+    [from, to]: [&Isometry3<f64>; 2],
     reader: &mut Reader,
-) -> Option<()> {
+) -> Option<TreeJoint> {
     let name = reader.attribute(joint, "name")?;
     let origin = from.inverse() * to;
-    let kind = match reader.attribute(joint, "type")? {
-        "fixed" => {
-            out.joint(&UrdfJoint::fixed(name, parent, child, origin));
-            return Some(());
-        }
-        "revolute" => "revolute",
-        "continuous" => "continuous",
-        "prismatic" => "prismatic",
+    let fixed = TreeJoint::fixed(name.to_owned(), ends, origin, reader.place(joint));
+    let motion = match reader.attribute(joint, "type")? {
+        "fixed" => return Some(fixed),
+        "revolute" => TreeMotion::Revolute,
+        "continuous" => TreeMotion::Continuous,
+        "prismatic" => TreeMotion::Prismatic,
         other => {
             let message =
                 format!("the joint `{name}` is of the type {other}, which can't be simulated");
@@ -298,32 +312,30 @@ fn write_joint(
         None => 0.0,
     };
     let is_open = range.iter().any(|end| end.abs() > UNLIMITED);
-    let (kind, range) = match (is_open, kind) {
-        (true, "prismatic") => (kind, [-SLIDES_M, SLIDES_M]),
-        (true, _) => ("continuous", [0.0; 2]),
-        (false, _) => (kind, range),
+    let (motion, [lower, upper]) = match (is_open, motion) {
+        (true, TreeMotion::Prismatic) => (motion, [-SLIDES_M, SLIDES_M]),
+        (true, _) | (_, TreeMotion::Continuous) => {
+            (TreeMotion::Continuous, [f64::NEG_INFINITY, f64::INFINITY])
+        }
+        (false, _) => (motion, range),
     };
     // Negative values mean that there is none.
     let stated = |value: f64, otherwise: f64| if value > 0.0 { value } else { otherwise };
-    out.joint(&UrdfJoint {
-        name,
-        kind,
-        parent,
-        child,
-        origin,
+    Some(TreeJoint {
+        motion,
         axis: direction,
-        range,
+        lower,
+        upper,
         effort: stated(effort, EFFORT),
         velocity: stated(velocity, VELOCITY),
         damping,
-        friction: 0.0,
         mimic: mimic(axis, reader),
-    });
-    Some(())
+        ..fixed
+    })
 }
 
 /// The joint that a joint follows, in SDF 1.11 and later.
-fn mimic(axis: Node, reader: &mut Reader) -> Option<(String, f64, f64)> {
+fn mimic(axis: Node, reader: &mut Reader) -> Option<TreeMimic> {
     let mimic = xml::child(axis, "mimic")?;
     let leader = mimic.attribute("joint")?.to_owned();
     let mut number = |name: &str, otherwise: f64| match xml::child(mimic, name) {
@@ -331,5 +343,11 @@ fn mimic(axis: Node, reader: &mut Reader) -> Option<(String, f64, f64)> {
         None => otherwise,
     };
     let (factor, offset) = (number("multiplier", 1.0), number("offset", 0.0));
-    Some((leader, factor, offset - factor * number("reference", 0.0)))
+    let offset = offset - factor * number("reference", 0.0);
+    Some(TreeMimic {
+        leader,
+        factor,
+        offset,
+        place: reader.place(mimic),
+    })
 }

@@ -1,6 +1,5 @@
 //! Reads objects in URDF.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
@@ -12,36 +11,17 @@ use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::sdf::{SdfModel, possible};
 use crate::foreign::xml::{self, Bound, Node, Reader};
-use actcheck_base::{Diagnostic, Diagnostics, Source};
+use actcheck_base::{Diagnostics, Source};
 use actcheck_data::{Part, PartJoint, Pose};
 
 /// Longest chain of links; a longer one is a cycle.
 const LONGEST_CHAIN: usize = 256;
-
-/// Properties that URDF can't state, of an object that was converted to it.
-#[derive(Debug, Default)]
-pub(crate) struct Materials {
-    /// By the names of links without `<inertial>`.
-    pub(crate) of_link: BTreeMap<String, Matter>,
-    pub(crate) friction: Option<f64>,
-}
-
-/// The basis of a link's mass.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Matter {
-    /// Unit: kilograms.
-    Mass(f64),
-    /// Unit: kg/m³.
-    Density(f64),
-}
 
 /// Reads the object of a URDF file and its faults. The object is `None` if there are errors.
 pub(crate) fn read(
     source: &Source,
     path: &Path,
     lookup: &Lookup,
-    materials: &Materials,
-    shapeless: Shapeless<'_>,
 ) -> (Option<SdfModel>, Diagnostics) {
     let text = repaired(&source.text);
     let document = match xml::parse_model(source, &text) {
@@ -51,17 +31,15 @@ pub(crate) fn read(
     let mut reader = Reader::new(source);
     let mut shapes = Shapes::new(lookup, path);
     shapes.digest.update(source.text.as_bytes());
-    if !materials.of_link.is_empty() {
-        shapes.digest.update(format!("{materials:?}").as_bytes());
-    }
     let root = document.root_element();
     let mut body = Body::default();
     if root.tag_name().name() == "robot" {
-        body = read_robot(root, materials, &mut shapes, &mut reader);
+        body = read_robot(root, &mut shapes, &mut reader);
         if body.parts.is_empty() && !reader.found.has_errors() {
-            shapeless.report(root, &mut reader);
+            let message = "the object has no solid shape: none of its links has a `<collision>`";
+            let help = "give a link a `<collision>`; a `<visual>` does not collide";
+            reader.error("W038", root, message.to_owned(), help);
         }
-        body.friction = materials.friction;
     } else {
         let message = format!(
             "the root is `<{}>` instead of `<robot>`",
@@ -90,46 +68,7 @@ pub(crate) fn read(
     )
 }
 
-/// The consequence of a model without solid shapes.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Shapeless<'a> {
-    /// W038 in terms of URDF.
-    Urdf,
-    /// W038 in terms of MJCF, in this text.
-    Mjcf(&'a Source),
-    /// None: the body is only seen.
-    Allowed,
-}
-
-impl Shapeless<'_> {
-    fn report(self, root: Node, reader: &mut Reader) {
-        match self {
-            Self::Urdf => {
-                let message =
-                    "the object has no solid shape: none of its links has a `<collision>`";
-                reader.error(
-                    "W038",
-                    root,
-                    message.to_owned(),
-                    "give a link a `<collision>`; a `<visual>` does not collide",
-                );
-            }
-            Self::Mjcf(source) => reader.found.push(
-                Diagnostic::error(
-                    "W038",
-                    "the object has no solid shape: none of its geoms collides",
-                )
-                .at(source, 0..0)
-                .help(
-                    "set `contype` and `conaffinity` of a geom to 1; a geom for which both are 0 is only seen",
-                ),
-            ),
-            Self::Allowed => {}
-        }
-    }
-}
-
-fn read_robot(root: Node, materials: &Materials, shapes: &mut Shapes, reader: &mut Reader) -> Body {
+fn read_robot(root: Node, shapes: &mut Shapes, reader: &mut Reader) -> Body {
     reader.warn_about_unknown_children(root, &["link", "joint", "material"]);
     let joints: Vec<Node> = xml::children(root, "joint").collect();
     let links: Vec<Node> = xml::children(root, "link").collect();
@@ -155,18 +94,18 @@ fn read_robot(root: Node, materials: &Materials, shapes: &mut Shapes, reader: &m
             (_, None) => continue,
         };
         joins.push(Join {
-            node: joint,
+            place: reader.place(joint),
             parent,
             child,
             joint: moves,
         });
     }
-    let assembly = Assembly::of(links.len(), &joins, reader);
+    let assembly = Assembly::of(links.len(), &joins, &mut reader.found);
     let mut bodies = assembly.empty_bodies(false);
     for (idx, (link, at)) in links.iter().zip(&places).enumerate() {
         if let Some(at) = at {
             read_link(
-                (*link, at, materials),
+                (*link, at),
                 &mut bodies[assembly.body_of(idx)],
                 shapes,
                 reader,
@@ -177,7 +116,7 @@ fn read_robot(root: Node, materials: &Materials, shapes: &mut Shapes, reader: &m
         .iter()
         .map(|link| link.attribute("name").unwrap_or_default())
         .collect();
-    assembly.attach(bodies, &names, reader)
+    assembly.attach(bodies, &names, &mut reader.found)
 }
 
 /// Reads a joint that moves a link, whose pose is known. Returns `None` after it has reported a
@@ -291,7 +230,7 @@ pub(crate) fn origin(node: Node, reader: &mut Reader) -> Option<Isometry3<f64>> 
 }
 
 fn read_link(
-    (link, at, materials): (Node, &Isometry3<f64>, &Materials),
+    (link, at): (Node, &Isometry3<f64>),
     body: &mut Body,
     shapes: &mut Shapes,
     reader: &mut Reader,
@@ -318,27 +257,7 @@ fn read_link(
         body.masses.push(mass);
         return;
     }
-    let own = &body.parts[before..];
-    let kg = match link
-        .attribute("name")
-        .and_then(|name| materials.of_link.get(name))
-    {
-        Some(Matter::Mass(kg)) => Some(*kg),
-        Some(Matter::Density(density)) => {
-            Some(density * own.iter().map(|part| part.shape.volume()).sum::<f64>())
-        }
-        None => None,
-    };
-    match kg {
-        _ if own.is_empty() => {}
-        // Moments without a tensor follow from the shapes.
-        Some(kg) => body.masses.push(Mass {
-            kg,
-            com: at.translation.vector,
-            about_com: None,
-        }),
-        None => body.has_unknown_mass = true,
-    }
+    body.has_unknown_mass |= body.parts.len() > before;
 }
 
 fn read_inertial(inertial: Node, link: &Isometry3<f64>, reader: &mut Reader) -> Option<Mass> {

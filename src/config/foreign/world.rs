@@ -15,9 +15,8 @@ use crate::foreign::lookup::Lookup;
 use crate::foreign::nested::Role;
 use crate::foreign::sdf::check_version;
 use crate::foreign::sdf_pose::pose;
-use crate::foreign::urdf::Shapeless;
 use crate::foreign::xml::{self, Node, Reader};
-use crate::foreign::{folder, fronts, mjcf_world, sdf, urdf};
+use crate::foreign::{folder, fronts, mjcf_world, sdf, tree_object};
 use crate::{Furniture, WorldMap};
 use actcheck_base::{Diagnostics, Severity, Source, Span, digest_of};
 use actcheck_data::{FLOOR_M, ObjectModel, Pose};
@@ -433,18 +432,16 @@ impl WorldReader<'_> {
 
     /// Adds the bodies of a world in MJCF.
     fn bodies(&mut self, root: Node, source: &Source) {
-        let pieces = match mjcf_world::read(source, self.path, self.included.lookup.files) {
-            Ok(pieces) => pieces,
+        let (pieces, text, said) = match mjcf_world::read(source, self.path, self.included.lookup) {
+            Ok(read) => read,
             Err(faults) => return self.reader.found.extend(faults),
         };
+        self.reader.found.extend(said);
         for piece in pieces {
-            let (model, said) = urdf::read(
-                &piece.urdf,
-                self.path,
-                self.included.lookup,
-                &piece.materials,
-                Shapeless::Allowed,
-            );
+            let mut shapes = Shapes::new(self.included.lookup, self.path);
+            shapes.digest.update(text.text.as_bytes());
+            shapes.digest.update(piece.name.as_bytes());
+            let (model, said) = tree_object::read(&piece.tree, &mut shapes);
             let solid = model.filter(|model| !model.body.parts.is_empty());
             let Some(mut model) = solid else {
                 self.reader.found.extend(said);

@@ -2,10 +2,10 @@
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-use actcheck_base::{Diagnostic, Diagnostics, Source, Span, check_xml, did_you_mean};
+use actcheck_base::{Diagnostic, Diagnostics, Source, SourceSpan, Span, check_xml, did_you_mean};
 
 /// Longest text of a model, robot or world; meshes have files of their own. Unit: bytes.
-const LONGEST_MODEL: usize = 16 << 20;
+pub(crate) const LONGEST_MODEL: usize = 16 << 20;
 /// Largest number of elements of one of the kinds in [`PARTS`]: each is simulated, or compared with
 /// all others.
 const MOST_PARTS: usize = 1_000;
@@ -141,6 +141,20 @@ pub(crate) fn span(node: Node) -> Span {
     start..start + 1 + node.tag_name().name().len()
 }
 
+/// Returns the span of the start tag of an element up to the end of its name.
+pub(crate) fn tag(place: &SourceSpan) -> Span {
+    let text = place.source.text.get(place.span.clone());
+    let name = text
+        .unwrap_or_default()
+        .find(|letter: char| letter.is_whitespace() || letter == '/' || letter == '>');
+    place.span.start..name.map_or(place.span.end, |name| place.span.start + name)
+}
+
+/// Returns the first child element.
+pub(crate) fn first(node: Node<'_>) -> Option<Node<'_>> {
+    node.children().find(Node::is_element)
+}
+
 /// Returns the first child element with this name. Returns `None` if there is no such child.
 pub(crate) fn child<'a>(node: Node<'a>, name: &str) -> Option<Node<'a>> {
     children(node, name).next()
@@ -158,9 +172,15 @@ pub(crate) fn text<'a>(node: Node<'a>) -> &'a str {
     node.text().map_or("", str::trim)
 }
 
+/// A text that is made of several files: the start of each piece in it, and the place of the piece
+/// in its own file. The first piece starts at 0.
+pub(crate) type Pieces = Vec<(usize, Source, usize)>;
+
 /// A file being read, and the faults found in it.
 pub(crate) struct Reader<'a> {
     pub(crate) source: &'a Source,
+    /// The pieces of the text; empty if it is one file.
+    pub(crate) pieces: Pieces,
     pub(crate) found: Diagnostics,
     n_errors: usize,
     n_warnings: usize,
@@ -170,9 +190,32 @@ impl<'a> Reader<'a> {
     pub(crate) fn new(source: &'a Source) -> Self {
         Self {
             source,
+            pieces: Vec::new(),
             found: Diagnostics::new(),
             n_errors: 0,
             n_warnings: 0,
+        }
+    }
+
+    /// Returns the place of an element, in the file that contains it.
+    pub(crate) fn place(&self, node: Node) -> SourceSpan {
+        self.located(node.range())
+    }
+
+    fn located(&self, span: Span) -> SourceSpan {
+        let after = self
+            .pieces
+            .partition_point(|(start, ..)| *start <= span.start);
+        let Some((start, source, own)) = after.checked_sub(1).map(|idx| &self.pieces[idx]) else {
+            return SourceSpan {
+                source: self.source.clone(),
+                span,
+            };
+        };
+        let moved = |at: usize| (at - start + own).min(source.text.len());
+        SourceSpan {
+            source: source.clone(),
+            span: moved(span.start)..moved(span.end),
         }
     }
 
@@ -197,9 +240,10 @@ impl<'a> Reader<'a> {
     ) {
         self.n_errors += 1;
         if self.n_errors <= MOST_FAULTS {
+            let SourceSpan { source, span } = self.located(span);
             self.found.push(
                 Diagnostic::error(code, message)
-                    .at(self.source, span)
+                    .at(&source, span)
                     .help(help),
             );
         }
@@ -226,9 +270,10 @@ impl<'a> Reader<'a> {
     ) {
         self.n_warnings += 1;
         if self.n_warnings <= MOST_FAULTS {
+            let SourceSpan { source, span } = self.located(span);
             self.found.push(
                 Diagnostic::warning(code, message)
-                    .at(self.source, span)
+                    .at(&source, span)
                     .help(help),
             );
         }

@@ -9,6 +9,12 @@ use crate::{Joint, SelfContact, World, ik};
 use actcheck_base::{Files, Source};
 use actcheck_data::RobotProfile;
 
+/// The profile with another URDF.
+fn with_urdf(profile: RobotProfile, text: String) -> RobotProfile {
+    actcheck_config::robot::with_urdf(profile, Source::new("hand.urdf", text))
+        .expect("it is a URDF")
+}
+
 /// A hand with fingers of 10 cm whose inner faces are 2 cm off its middle at position 0. The grasp
 /// frame is 10 cm from the hinges. `left` and `right` are the types and limits of the finger
 /// joints.
@@ -37,7 +43,7 @@ pub(crate) fn hand(left: &str, right: &str, finger_joints: &[&str]) -> RobotProf
         finger("left", 0.02, left),
         finger("right", -0.02, right),
     );
-    profile.urdf = Source::new("hand.urdf", text);
+    profile = with_urdf(profile, text);
     profile.base_joints = None;
     profile.arm_joints = vec!["lift".to_owned()];
     profile.home = vec![0.6];
@@ -244,7 +250,8 @@ fn a_mimic_joint_outside_the_gripper_follows_its_leader() {
                 <axis xyz=\"0 0 1\"/><limit lower=\"0\" upper=\"1\" effort=\"900\" velocity=\"0.2\"/>\
                 <mimic joint=\"lift\" multiplier=\"0.5\"/></joint><link name=\"mast_link\"><inertial><mass value=\"5\"/>\
                 <inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" iyy=\"0.01\" iyz=\"0\" izz=\"0.01\"/></inertial></link></robot>";
-    profile.urdf = Source::new("hand.urdf", profile.urdf.text.replace("</robot>", mast));
+    let text = profile.urdf.text.replace("</robot>", mast);
+    profile = with_urdf(profile, text);
     let mut world = alone(profile);
     let at = |world: &World, name: &str| {
         let idx = world
@@ -284,7 +291,7 @@ fn inverse_kinematics_moves_the_joints_that_follow_others() {
         .urdf
         .text
         .replacen("<child link=\"palm\"/>", "<child link=\"stage\"/>", 1);
-    profile.urdf = Source::new("hand.urdf", text.replace("</robot>", stage));
+    profile = with_urdf(profile, text.replace("</robot>", stage));
     let world = alone(profile);
     let kinematics = world.kinematics();
     let at = |name: &str| {
@@ -317,8 +324,8 @@ fn fingers_that_overlap_do_not_forbid_postures_of_the_arm() {
     let third = "<joint name=\"third\" type=\"fixed\"><parent link=\"left_finger\"/><child link=\"thumb\"/></joint>\
                  <link name=\"thumb\"><collision><origin xyz=\"0.06 -0.02 0\"/><geometry><box size=\"0.1 0.09 0.03\"/>\
                  </geometry></collision></link></robot>";
-    let mut thick = profile.clone();
-    thick.urdf = Source::new("hand.urdf", profile.urdf.text.replace("</robot>", third));
+    let text = profile.urdf.text.replace("</robot>", third);
+    let thick = with_urdf(profile.clone(), text);
     let world = alone(thick);
     let mut positions = world.observe().positions;
     let itself = SelfContact::new(world.kinematics(), &[]);
@@ -356,14 +363,14 @@ fn the_grip_is_as_strong_as_its_motors() {
 
 /// A hand with a third finger beside the right one, whose joint turns in the other direction.
 fn three_fingers(finger_joints: &[&str]) -> RobotProfile {
-    let mut profile = hand(&turning(0.0, 0.6), &turning(-0.6, 0.0), finger_joints);
+    let profile = hand(&turning(0.0, 0.6), &turning(-0.6, 0.0), finger_joints);
     let third = "<link name=\"third_finger\"><inertial><mass value=\"0.1\"/><inertia ixx=\"1e-4\" ixy=\"0\" ixz=\"0\" \
                  iyy=\"1e-4\" iyz=\"0\" izz=\"1e-4\"/></inertial><collision><origin xyz=\"0.06 -0.005 0\"/><geometry>\
                  <box size=\"0.1 0.01 0.03\"/></geometry></collision></link><joint name=\"third\" type=\"revolute\">\
                  <parent link=\"palm\"/><child link=\"third_finger\"/><origin xyz=\"0 -0.02 0.04\"/><axis xyz=\"0 0 -1\"/>\
                  <limit lower=\"0\" upper=\"0.6\" effort=\"20\" velocity=\"2\"/></joint></robot>";
-    profile.urdf = Source::new("hand.urdf", profile.urdf.text.replace("</robot>", third));
-    profile
+    let text = profile.urdf.text.replace("</robot>", third);
+    with_urdf(profile, text)
 }
 
 /// A third finger closes with the one beside it, and both share the force of their side, in
@@ -441,7 +448,8 @@ fn joints_without_a_role_are_rigid() {
     let mast = "<joint name=\"mast\" type=\"prismatic\"><parent link=\"foot\"/><child link=\"base\"/>\
                 <axis xyz=\"0 0 1\"/><limit lower=\"0.25\" upper=\"1\" effort=\"900\" velocity=\"0.2\"/></joint>\
                 <link name=\"foot\"/></robot>";
-    profile.urdf = Source::new("hand.urdf", profile.urdf.text.replace("</robot>", mast));
+    let text = profile.urdf.text.replace("</robot>", mast);
+    profile = with_urdf(profile, text);
     let names = |profile: &RobotProfile| -> Vec<String> {
         let model = RobotModel::read(profile).expect("it is valid");
         let mut names: Vec<String> = model
@@ -651,10 +659,7 @@ fn all_links_that_a_finger_joint_moves_belong_to_the_finger_on_their_side() {
     );
     let slides = "type=\"prismatic\"><parent link=\"palm\"/><axis xyz=\"1 0 0\"/><limit lower=\"-0.1\" upper=\"0.1\" effort=\"9\" \
                   velocity=\"1\"/><mimic joint=\"left\" multiplier=\"0.001\"/>";
-    let base = RobotProfile {
-        urdf: Source::new("hand.urdf", carried),
-        ..plain
-    };
+    let base = with_urdf(plain, carried);
     let carriage = with_links(
         &base,
         &[link(

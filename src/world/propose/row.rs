@@ -106,10 +106,10 @@ mod tests {
             )
         };
         let fingers: String = axes.iter().enumerate().map(finger).collect();
-        profile.urdf = Source::new(
-            "hand.urdf",
-            format!("<robot name=\"hand\"><link name=\"palm\">{inertial}</link>{fingers}</robot>"),
-        );
+        let text =
+            format!("<robot name=\"hand\"><link name=\"palm\">{inertial}</link>{fingers}</robot>");
+        profile = actcheck_config::robot::with_urdf(profile, Source::new("hand.urdf", text))
+            .expect("it is a URDF");
         profile.arm_joints.clear();
         profile.finger_joints.clear();
         RobotModel::read(&profile).expect("the hand is valid")

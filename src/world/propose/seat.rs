@@ -124,7 +124,8 @@ mod tests {
              <origin xyz=\"{hinge_m} 0.02 0\"/><axis xyz=\"0 0 1\"/>\
              <limit lower=\"0\" upper=\"1.4\" effort=\"5\" velocity=\"2\"/></joint></robot>"
         );
-        profile.urdf = Source::new("hand.urdf", text);
+        profile = actcheck_config::robot::with_urdf(profile, Source::new("hand.urdf", text))
+            .expect("it is a URDF");
         profile.finger_joints = vec!["jaw".to_owned()];
         let model = RobotModel::read(&profile).expect("the hand is valid");
         let links = ["jaw", "palm"].map(|name| {

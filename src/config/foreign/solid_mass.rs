@@ -1,0 +1,367 @@
+//! Mass, centre and inertia of shapes from their densities, as MuJoCo computes them for its geoms.
+
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+use nalgebra::{Isometry3, Matrix3, Vector3};
+
+use actcheck_data::{Matter, Mesh, Shape, TreeGeometry, TreeSolid};
+
+/// The mass of a body. Frame: that of the shape, or of the link.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct SolidMass {
+    /// Unit: kilograms.
+    pub(crate) kg: f64,
+    /// Centre of mass. Unit: metres.
+    pub(crate) com: Vector3<f64>,
+    /// Inertia tensor about the centre of mass, along the axes of the frame. Unit: kg·m².
+    pub(crate) about_com: Matrix3<f64>,
+}
+
+impl SolidMass {
+    const NONE: Self = Self {
+        kg: 0.0,
+        com: Vector3::new(0.0, 0.0, 0.0),
+        about_com: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    };
+
+    /// Adds another mass in the same frame, by the parallel axis theorem.
+    fn plus(self, other: Self) -> Self {
+        let kg = self.kg + other.kg;
+        if kg <= 0.0 {
+            return self;
+        }
+        let com = (self.com * self.kg + other.com * other.kg) / kg;
+        let about = |mass: &Self| {
+            let arm = mass.com - com;
+            mass.about_com
+                + (Matrix3::identity() * arm.norm_squared() - arm * arm.transpose()) * mass.kg
+        };
+        Self {
+            kg,
+            com,
+            about_com: about(&self) + about(&other),
+        }
+    }
+
+    fn moved(self, by: &Isometry3<f64>) -> Self {
+        let turned = by.rotation.to_rotation_matrix();
+        Self {
+            kg: self.kg,
+            com: (by * nalgebra::Point3::from(self.com)).coords,
+            about_com: turned.matrix() * self.about_com * turned.matrix().transpose(),
+        }
+    }
+
+    fn times(self, factor: f64) -> Self {
+        Self {
+            kg: self.kg * factor,
+            com: self.com,
+            about_com: self.about_com * factor,
+        }
+    }
+}
+
+/// Returns the mass of all shapes that have one, in the frame of their link; a mass of 0 if none
+/// has. `meshes` are the shapes of mesh files, in the files' own scales.
+pub(crate) fn together<'a>(
+    solids: impl IntoIterator<Item = &'a TreeSolid>,
+    meshes: &BTreeMap<String, Vec<Shape>>,
+) -> SolidMass {
+    let masses = solids
+        .into_iter()
+        .filter_map(|solid| Some(of(solid, meshes)?.moved(&solid.pose)));
+    masses.fold(SolidMass::NONE, SolidMass::plus)
+}
+
+/// Returns the mass of a shape in its own frame; `None` if it has none.
+fn of(solid: &TreeSolid, meshes: &BTreeMap<String, Vec<Shape>>) -> Option<SolidMass> {
+    let matter = solid.matter?;
+    let is_shell = matches!(matter, Matter::Shell(_) | Matter::ShellMass(_));
+    let unit = of_unit(&solid.geometry, is_shell, meshes)?;
+    let (Matter::Mass(amount)
+    | Matter::Density(amount)
+    | Matter::Shell(amount)
+    | Matter::ShellMass(amount)) = matter;
+    let factor = match matter {
+        Matter::Mass(_) | Matter::ShellMass(_) => amount / unit.kg,
+        Matter::Density(_) | Matter::Shell(_) => amount,
+    };
+    (factor.is_finite() && factor > 0.0).then(|| unit.times(factor))
+}
+
+/// Returns the mass of a shape with a density of 1, or of its surface with 1 kg/m².
+fn of_unit(
+    geometry: &TreeGeometry,
+    is_shell: bool,
+    meshes: &BTreeMap<String, Vec<Shape>>,
+) -> Option<SolidMass> {
+    let centred = |kg: f64, moments: [f64; 3]| SolidMass {
+        kg,
+        com: Vector3::zeros(),
+        about_com: Matrix3::from_diagonal(&Vector3::from(moments)),
+    };
+    Some(match geometry {
+        TreeGeometry::Mesh { file, scale } => {
+            let parts = meshes.get(file)?.iter().filter_map(|shape| match shape {
+                Shape::Mesh { mesh } => Some(of_mesh(&mesh.scaled(*scale), is_shell)),
+                _ => None,
+            });
+            parts.fold(SolidMass::NONE, SolidMass::plus)
+        }
+        TreeGeometry::Box { size } if is_shell => hollow_box(*size),
+        TreeGeometry::Box { size: [x, y, z] } => {
+            let (kg, [xx, yy, zz]) = (x * y * z, [x * x, y * y, z * z]);
+            centred(kg, [yy + zz, xx + zz, xx + yy].map(|sum| kg * sum / 12.0))
+        }
+        TreeGeometry::Ellipsoid { radii: [x, y, z] } => {
+            let (kg, [xx, yy, zz]) = (4.0 / 3.0 * PI * x * y * z, [x * x, y * y, z * z]);
+            centred(kg, [yy + zz, xx + zz, xx + yy].map(|sum| kg * sum / 5.0))
+        }
+        TreeGeometry::Sphere { radius: r } if is_shell => {
+            let kg = 4.0 * PI * r * r;
+            centred(kg, [2.0 / 3.0 * kg * r * r; 3])
+        }
+        TreeGeometry::Sphere { radius: r } => {
+            let kg = 4.0 / 3.0 * PI * r.powi(3);
+            centred(kg, [0.4 * kg * r * r; 3])
+        }
+        TreeGeometry::Cylinder { radius: r, length } if is_shell => {
+            let (side, ends) = (2.0 * PI * r * length, 2.0 * PI * r * r);
+            let about_z = side * r * r + ends * r * r / 2.0;
+            let across = side * (r * r / 2.0 + length * length / 12.0)
+                + ends * (r * r / 4.0 + length * length / 4.0);
+            centred(side + ends, [across, across, about_z])
+        }
+        TreeGeometry::Cylinder { radius: r, length } => {
+            let kg = PI * r * r * length;
+            let across = kg * (3.0 * r * r + length * length) / 12.0;
+            centred(kg, [across, across, kg * r * r / 2.0])
+        }
+        TreeGeometry::Capsule { radius, length } => capsule(*radius, *length, is_shell),
+    })
+}
+
+/// A cylinder between two halves of a ball; a shell has no lids between them.
+fn capsule(r: f64, length: f64, is_shell: bool) -> SolidMass {
+    // Mass, moment about z, and moment across it about the own centre of the cylinder.
+    let (tube, tube_z, tube_across) = if is_shell {
+        let kg = 2.0 * PI * r * length;
+        (kg, kg * r * r, kg * (r * r / 2.0 + length * length / 12.0))
+    } else {
+        let kg = PI * r * r * length;
+        let across = kg * (3.0 * r * r + length * length) / 12.0;
+        (kg, kg * r * r / 2.0, across)
+    };
+    // Both halves together: their distance from the ball's middle to their centre of mass, and the
+    // moment of the whole ball about its middle.
+    let (balls, centre, ball) = if is_shell {
+        let kg = 4.0 * PI * r * r;
+        (kg, r / 2.0, 2.0 / 3.0 * kg * r * r)
+    } else {
+        let kg = 4.0 / 3.0 * PI * r.powi(3);
+        (kg, 3.0 / 8.0 * r, 0.4 * kg * r * r)
+    };
+    let half = length / 2.0;
+    // Each half is moved away by half of the length along z.
+    let balls_across = ball + balls * (half * half + 2.0 * half * centre);
+    let across = tube_across + balls_across;
+    SolidMass {
+        kg: tube + balls,
+        com: Vector3::zeros(),
+        about_com: Matrix3::from_diagonal(&Vector3::new(across, across, tube_z + ball)),
+    }
+}
+
+/// The six faces of a box.
+fn hollow_box(size: [f64; 3]) -> SolidMass {
+    let mut whole = SolidMass::NONE;
+    for axis in 0..3 {
+        let [a, b] = [size[(axis + 1) % 3], size[(axis + 2) % 3]];
+        let kg = a * b;
+        let mut moments = Vector3::zeros();
+        moments[axis] = kg * (a * a + b * b) / 12.0;
+        moments[(axis + 1) % 3] = kg * b * b / 12.0;
+        moments[(axis + 2) % 3] = kg * a * a / 12.0;
+        for side in [-0.5, 0.5] {
+            let mut com = Vector3::zeros();
+            com[axis] = side * size[axis];
+            whole = whole.plus(SolidMass {
+                kg,
+                com,
+                about_com: Matrix3::from_diagonal(&moments),
+            });
+        }
+    }
+    whole
+}
+
+/// A mesh: the pyramids from the middle of its surface to its triangles, or the triangles
+/// themselves.
+///
+/// As MuJoCo's usual rule has it, a pyramid counts positive however its triangle is turned, so that
+/// a mesh with some turned triangles has a mass too.
+fn of_mesh(mesh: &Mesh, is_shell: bool) -> SolidMass {
+    let corners = |triangle: &[u32; 3]| {
+        triangle.map(|corner| {
+            let vertex = mesh.vertices.get(corner as usize).copied();
+            Vector3::from(vertex.unwrap_or([0.0; 3]))
+        })
+    };
+    let mut area = 0.0;
+    let mut middle = Vector3::zeros();
+    for triangle in &mesh.triangles {
+        let [a, b, c] = corners(triangle);
+        let own = (b - a).cross(&(c - a)).norm() / 2.0;
+        area += own;
+        middle += (a + b + c) / 3.0 * own;
+    }
+    if area <= 0.0 {
+        return SolidMass::NONE;
+    }
+    middle /= area;
+    let mut kg = 0.0;
+    let mut first = Vector3::zeros();
+    // The integral of the products of coordinates, from the middle.
+    let mut second = Matrix3::zeros();
+    for triangle in &mesh.triangles {
+        let [a, b, c] = corners(triangle).map(|corner| corner - middle);
+        let sum = a + b + c;
+        let squares = a * a.transpose() + b * b.transpose() + c * c.transpose();
+        if is_shell {
+            let own = (b - a).cross(&(c - a)).norm() / 2.0;
+            kg += own;
+            first += sum * (own / 3.0);
+            second += (squares + sum * sum.transpose()) * (own / 12.0);
+        } else {
+            let own = (a.dot(&b.cross(&c)) / 6.0).abs();
+            kg += own;
+            first += sum * (own / 4.0);
+            second += (squares + sum * sum.transpose()) * (own / 20.0);
+        }
+    }
+    if kg <= 0.0 {
+        return SolidMass::NONE;
+    }
+    let com = first / kg;
+    let spread = second - com * com.transpose() * kg;
+    SolidMass {
+        kg,
+        com: middle + com,
+        about_com: Matrix3::identity() * spread.trace() - spread,
+    }
+}
+
+/// Half extents of the box with the same inertia as a mesh, and the frame of its principal axes,
+/// from the shortest extent along x to the longest along z. MuJoCo fits its primitives so.
+pub(crate) fn equivalent_box(mesh: &Mesh) -> Option<(Isometry3<f64>, [f64; 3])> {
+    let mass = of_mesh(mesh, false);
+    if mass.kg <= 0.0 {
+        return None;
+    }
+    let eigen = mass.about_com.symmetric_eigen();
+    // The largest moment belongs to the shortest extent.
+    let mut order = [0, 1, 2];
+    order.sort_by(|one, other| eigen.eigenvalues[*other].total_cmp(&eigen.eigenvalues[*one]));
+    let [x, y] = [order[0], order[1]].map(|idx| eigen.eigenvectors.column(idx).into_owned());
+    let axes = Matrix3::from_columns(&[x, y, x.cross(&y)]);
+    let rotation = nalgebra::UnitQuaternion::from_rotation_matrix(
+        &nalgebra::Rotation3::from_matrix_unchecked(axes),
+    );
+    let moments = order.map(|idx| eigen.eigenvalues[idx]);
+    let sum: f64 = moments.iter().sum();
+    let half = moments.map(|own| (6.0 * (sum - 2.0 * own) / mass.kg).max(0.0).sqrt() / 2.0);
+    Some((Isometry3::from_parts(mass.com.into(), rotation), half))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use actcheck_base::SourceSpan;
+
+    fn solid(geometry: TreeGeometry, matter: Matter) -> TreeSolid {
+        TreeSolid {
+            pose: Isometry3::identity(),
+            geometry,
+            matter: Some(matter),
+            friction: None,
+            place: SourceSpan::default(),
+        }
+    }
+
+    /// A box as a mesh, around a point.
+    fn box_mesh(half: [f64; 3], at: [f64; 3]) -> Mesh {
+        let corner = |idx: u32| {
+            [0, 1, 2].map(|axis| {
+                let sign = if idx >> axis & 1 == 1 { 1.0 } else { -1.0 };
+                at[axis] + sign * half[axis]
+            })
+        };
+        let triangles = vec![
+            [0, 2, 1],
+            [1, 2, 3],
+            [4, 5, 6],
+            [5, 7, 6],
+            [0, 1, 4],
+            [1, 5, 4],
+            [2, 6, 3],
+            [3, 6, 7],
+            [0, 4, 2],
+            [2, 4, 6],
+            [1, 3, 5],
+            [3, 7, 5],
+        ];
+        Mesh::new((0..8).map(corner).collect(), triangles).expect("it is a mesh")
+    }
+
+    /// A mesh of a box has the mass, centre and moments of the box, and so has its shell.
+    #[test]
+    fn a_mesh_weighs_as_its_primitive() {
+        let mesh = Shape::Mesh {
+            mesh: box_mesh([0.1, 0.2, 0.3], [1.0, -2.0, 0.5]),
+        };
+        let meshes = BTreeMap::from([("box".to_owned(), vec![mesh])]);
+        let as_mesh = TreeGeometry::Mesh {
+            file: "box".to_owned(),
+            scale: [1.0; 3],
+        };
+        let as_box = TreeGeometry::Box {
+            size: [0.2, 0.4, 0.6],
+        };
+        for matter in [
+            Matter::Density(700.0),
+            Matter::Mass(3.0),
+            Matter::Shell(2.0),
+            Matter::ShellMass(5.0),
+        ] {
+            let [one, other] = [&as_mesh, &as_box]
+                .map(|geometry| together([&solid(geometry.clone(), matter)], &meshes));
+            assert!(
+                (one.kg - other.kg).abs() < 1e-9,
+                "{matter:?}: {one:?} {other:?}"
+            );
+            assert!(
+                (one.about_com - other.about_com).abs().max() < 1e-9,
+                "{matter:?}"
+            );
+            assert!((one.com - Vector3::new(1.0, -2.0, 0.5)).norm() < 1e-9);
+        }
+        let two = [
+            solid(as_box.clone(), Matter::Mass(1.0)),
+            solid(as_box, Matter::Mass(2.0)),
+        ];
+        assert!((together(&two, &meshes).kg - 3.0).abs() < 1e-12);
+    }
+
+    /// The long box lies along the x axis of its mesh, and along z of the fitted box.
+    #[test]
+    fn the_equivalent_box_of_a_box_is_the_box() {
+        let (pose, half) =
+            equivalent_box(&box_mesh([0.3, 0.1, 0.2], [1.0, 0.0, 0.0])).expect("it has a volume");
+        for (found, expected) in half.iter().zip([0.1, 0.2, 0.3]) {
+            assert!((found - expected).abs() < 1e-9, "{half:?}");
+        }
+        assert!((pose.rotation * Vector3::z()).x.abs() > 0.999_999);
+        assert!((pose.translation.vector - Vector3::x()).norm() < 1e-9);
+    }
+}

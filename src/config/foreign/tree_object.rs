@@ -1,0 +1,205 @@
+//! Makes an object of a model's tree: its bodies, and the joints that move them.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Isometry3;
+
+use crate::foreign::assembly::{Assembly, Join};
+use crate::foreign::body::{Body, Mass, is_possible};
+use crate::foreign::geometry::{Shapes, report_volume};
+use crate::foreign::sdf::SdfModel;
+use crate::foreign::xml;
+use actcheck_base::{Diagnostic, Diagnostics, SourceSpan};
+use actcheck_data::{
+    ModelTree, Part, PartJoint, Pose, Shape, TreeGeometry, TreeJoint, TreeLink, TreeMotion,
+    TreeSolid,
+};
+
+/// Longest chain of links; a longer one is a cycle.
+const LONGEST_CHAIN: usize = 256;
+/// Friction coefficient of geoms without one: MuJoCo's default.
+const FRICTION: f64 = 1.0;
+
+/// Makes an object of the tree of an MJCF file, and reports its faults. The object is `None` if
+/// there are errors. A body without shapes is one that is only seen.
+pub(crate) fn read(tree: &ModelTree, shapes: &mut Shapes) -> (Option<SdfModel>, Diagnostics) {
+    let mut found = Diagnostics::new();
+    let body = body(tree, shapes, &mut found);
+    if found.has_errors() {
+        return (None, found);
+    }
+    let digest = shapes.digest.clone().finish();
+    let model = SdfModel {
+        body,
+        pose: Isometry3::identity(),
+        is_static: false,
+        digest,
+    };
+    (Some(model), found)
+}
+
+fn body(tree: &ModelTree, shapes: &mut Shapes, found: &mut Diagnostics) -> Body {
+    let index: BTreeMap<&str, usize> = tree
+        .links
+        .iter()
+        .enumerate()
+        .map(|(idx, link)| (link.name.as_str(), idx))
+        .collect();
+    let places: Vec<Option<Isometry3<f64>>> = tree
+        .links
+        .iter()
+        .map(|link| place(link, tree, found))
+        .collect();
+    let mut joins = Vec::new();
+    for joint in &tree.joints {
+        let ends = [&joint.parent, &joint.child].map(|name| index.get(name.as_str()).copied());
+        let [Some(parent), Some(child)] = ends else {
+            continue;
+        };
+        let moves = match (joint.motion, &places[child]) {
+            (TreeMotion::Fixed, _) => None,
+            (_, Some(at)) => match part_joint(joint, at) {
+                Some(moves) => Some(moves),
+                None => continue,
+            },
+            (_, None) => continue,
+        };
+        joins.push(Join {
+            place: joint.place.clone(),
+            parent,
+            child,
+            joint: moves,
+        });
+    }
+    let assembly = Assembly::of(tree.links.len(), &joins, found);
+    let mut bodies = assembly.empty_bodies(false);
+    let mut meshes = BTreeMap::new();
+    for (idx, (link, at)) in tree.links.iter().zip(&places).enumerate() {
+        if let Some(at) = at {
+            let body = &mut bodies[assembly.body_of(idx)];
+            read_link((link, at), tree, body, &mut meshes, shapes, found);
+        }
+    }
+    let names: Vec<&str> = tree.links.iter().map(|link| link.name.as_str()).collect();
+    let mut whole = assembly.attach(bodies, &names, found);
+    whole.friction = friction(tree, found);
+    whole
+}
+
+/// The friction of an object: the largest of its shapes, as one number.
+fn friction(tree: &ModelTree, found: &mut Diagnostics) -> Option<f64> {
+    let solids = || tree.links.iter().flat_map(|link| &link.solids);
+    if solids().all(|solid| solid.friction.is_none()) {
+        return None;
+    }
+    let of = |solid: &TreeSolid| solid.friction.unwrap_or(FRICTION);
+    let most = solids().map(of).fold(0.0, f64::max);
+    if let Some(other) = solids().find(|solid| of(solid) < most) {
+        let message = format!(
+            "this geom has the friction {}, but the object has one friction here: its largest, {most}",
+            of(other)
+        );
+        warn(
+            found,
+            message,
+            &other.place,
+            "give all geoms the same `friction`",
+        );
+    }
+    Some(most)
+}
+
+fn warn(found: &mut Diagnostics, message: String, at: &SourceSpan, help: &str) {
+    found.push(
+        Diagnostic::warning("W036", message)
+            .at(&at.source, xml::tag(at))
+            .help(help),
+    );
+}
+
+/// Returns the pose of a link relative to the root, through its chain of joints.
+fn place(link: &TreeLink, tree: &ModelTree, found: &mut Diagnostics) -> Option<Isometry3<f64>> {
+    let mut at = Isometry3::identity();
+    let mut name = &link.name;
+    for _ in 0..LONGEST_CHAIN {
+        let Some(joint) = tree.joints.iter().find(|joint| joint.child == *name) else {
+            return Some(at);
+        };
+        at = joint.origin * at;
+        name = &joint.parent;
+    }
+    let error = Diagnostic::error("W035", "the link's joints form a cycle")
+        .at(&link.place.source, xml::tag(&link.place));
+    found.push(error.help("links form one tree"));
+    None
+}
+
+/// Returns the motion of a part by a joint; `None` if its kind can't be simulated, which has been
+/// reported.
+fn part_joint(joint: &TreeJoint, at: &Isometry3<f64>) -> Option<PartJoint> {
+    let slides = match joint.motion {
+        TreeMotion::Prismatic => true,
+        TreeMotion::Revolute | TreeMotion::Continuous => false,
+        _ => return None,
+    };
+    let axis = (at.rotation * joint.axis).try_normalize(1e-9)?;
+    Some(PartJoint {
+        slides,
+        axis: axis.into(),
+        anchor_m: at.translation.vector.into(),
+        range: [joint.lower, joint.upper],
+        damping: joint.damping.max(0.0),
+        friction: joint.friction.max(0.0),
+    })
+}
+
+fn read_link(
+    (link, at): (&TreeLink, &Isometry3<f64>),
+    tree: &ModelTree,
+    body: &mut Body,
+    meshes: &mut BTreeMap<String, Vec<Shape>>,
+    shapes: &mut Shapes,
+    found: &mut Diagnostics,
+) {
+    for solid in &link.solids {
+        shapes.load(solid, tree, meshes, found);
+    }
+    for solid in &link.solids {
+        let Some(shape) = shape(&solid.geometry, meshes) else {
+            continue;
+        };
+        report_volume(&shape, &solid.place, found);
+        body.parts.push(Part {
+            pose: Pose::from_isometry(&(at * solid.pose)),
+            shape,
+        });
+    }
+    let Some(stated) = link.inertial.as_ref().filter(|stated| stated.kg > 0.0) else {
+        body.has_unknown_mass |= !link.solids.is_empty();
+        return;
+    };
+    let pose = at * stated.pose;
+    let turned = pose.rotation.to_rotation_matrix();
+    let about_com = turned.matrix() * stated.about_com * turned.matrix().transpose();
+    let possible = is_possible(&about_com);
+    if !possible {
+        let message =
+            "these moments of inertia are impossible: they are computed from the shapes instead";
+        let place = stated.moments_place.as_ref().unwrap_or(&stated.place);
+        let help = "each principal moment must be above 0 and at most the sum of the other two";
+        warn(found, message.to_owned(), place, help);
+    }
+    body.masses.push(Mass {
+        kg: stated.kg,
+        com: pose.translation.vector,
+        about_com: possible.then_some(about_com),
+    });
+}
+
+/// Returns the shape of a geometry; `None` if its mesh has a fault, which has been reported.
+fn shape(geometry: &TreeGeometry, meshes: &BTreeMap<String, Vec<Shape>>) -> Option<Shape> {
+    match geometry {
+        TreeGeometry::Mesh { file, scale } => Some(meshes.get(file)?.first()?.scaled(*scale)),
+        primitive => primitive.solid(),
+    }
+}
