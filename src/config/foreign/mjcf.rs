@@ -113,6 +113,7 @@ pub(super) fn with_model<T>(
     let model = Model {
         tree: ModelTree::default(),
         couplings: Rc::new(Couplings::read(root, &compiler, &mut reader)),
+        bodies: Rc::new(names_of_bodies(root)),
         compiler: Rc::new(compiler),
         names: BTreeMap::new(),
         joint_names: BTreeMap::new(),
@@ -143,6 +144,13 @@ pub(super) fn unique(names: &mut BTreeMap<String, u32>, name: &str) -> String {
     }
 }
 
+fn names_of_bodies(root: Node) -> BTreeSet<String> {
+    root.descendants()
+        .filter(|node| node.has_tag_name("body"))
+        .filter_map(|body| body.attribute("name").map(str::to_owned))
+        .collect()
+}
+
 /// The file of a model.
 #[derive(Clone, Copy)]
 pub(super) struct File<'a> {
@@ -157,6 +165,8 @@ pub(super) struct Model<'a> {
     pub(super) tree: ModelTree,
     pub(super) compiler: Rc<Compiler>,
     couplings: Rc<Couplings>,
+    /// Names of the file's bodies.
+    bodies: Rc<BTreeSet<String>>,
     /// Names of links in use, each with the number of its copies.
     names: BTreeMap<String, u32>,
     /// The same for joints: a joint often has the name of its body.
@@ -179,6 +189,7 @@ impl Model<'_> {
             tree: ModelTree::default(),
             compiler: Rc::clone(&self.compiler),
             couplings: Rc::clone(&self.couplings),
+            bodies: Rc::clone(&self.bodies),
             names: BTreeMap::new(),
             joint_names: BTreeMap::new(),
             masks: BTreeMap::new(),
@@ -278,7 +289,10 @@ impl Model<'_> {
                     } else {
                         Isometry3::identity()
                     };
-                    let name = self.unique(&name);
+                    // A name that a body has, too, is that of the body's link.
+                    let is_taken = self.bodies.contains(&name);
+                    let ending = if is_taken { "_frame" } else { "" };
+                    let name = self.unique(&format!("{name}{ending}"));
                     self.frame(&name, link, shift * pose * turned, reader.place(node));
                 }
                 "attach" => self.attach(item, link, &shift, reader),

@@ -196,59 +196,71 @@ fn hollow_box(size: [f64; 3]) -> SolidMass {
     whole
 }
 
-/// A mesh: the pyramids from the middle of its surface to its triangles, or the triangles
+/// The sums over the pyramids from a point to the triangles of a mesh, or over the triangles
 /// themselves.
-///
-/// As MuJoCo's usual rule has it, a pyramid counts positive however its triangle is turned, so that
-/// a mesh with some turned triangles has a mass too.
-fn of_mesh(mesh: &Mesh, is_shell: bool) -> SolidMass {
-    let corners = |triangle: &[u32; 3]| {
-        triangle.map(|corner| {
-            let vertex = mesh.vertices.get(corner as usize).copied();
-            Vector3::from(vertex.unwrap_or([0.0; 3]))
-        })
-    };
-    let mut area = 0.0;
-    let mut middle = Vector3::zeros();
-    for triangle in &mesh.triangles {
-        let [a, b, c] = corners(triangle);
-        let own = (b - a).cross(&(c - a)).norm() / 2.0;
-        area += own;
-        middle += (a + b + c) / 3.0 * own;
-    }
-    if area <= 0.0 {
-        return SolidMass::NONE;
-    }
-    middle /= area;
-    let mut kg = 0.0;
-    let mut first = Vector3::zeros();
-    // The integral of the products of coordinates, from the middle.
-    let mut second = Matrix3::zeros();
-    for triangle in &mesh.triangles {
-        let [a, b, c] = corners(triangle).map(|corner| corner - middle);
-        let sum = a + b + c;
-        let squares = a * a.transpose() + b * b.transpose() + c * c.transpose();
-        if is_shell {
-            let own = (b - a).cross(&(c - a)).norm() / 2.0;
-            kg += own;
-            first += sum * (own / 3.0);
-            second += (squares + sum * sum.transpose()) * (own / 12.0);
-        } else {
-            let own = (a.dot(&b.cross(&c)) / 6.0).abs();
-            kg += own;
-            first += sum * (own / 4.0);
-            second += (squares + sum * sum.transpose()) * (own / 20.0);
+struct Sums {
+    /// Volume or area.
+    amount: f64,
+    /// The integral of the coordinates, from the point.
+    first: Vector3<f64>,
+    /// The integral of the products of coordinates, from the point.
+    second: Matrix3<f64>,
+}
+
+impl Sums {
+    /// A pyramid counts positive however its triangle is turned, so that a mesh with some turned
+    /// triangles has a mass too.
+    fn from(point: Vector3<f64>, mesh: &Mesh, is_shell: bool) -> Self {
+        let mut sums = Self {
+            amount: 0.0,
+            first: Vector3::zeros(),
+            second: Matrix3::zeros(),
+        };
+        for triangle in &mesh.triangles {
+            let [a, b, c] = triangle.map(|corner| {
+                let vertex = mesh.vertices.get(corner as usize).copied();
+                Vector3::from(vertex.unwrap_or([0.0; 3])) - point
+            });
+            let sum = a + b + c;
+            let squares = a * a.transpose() + b * b.transpose() + c * c.transpose();
+            // A pyramid has four corners, one of them at the point; a triangle has three.
+            let (own, corners) = if is_shell {
+                ((b - a).cross(&(c - a)).norm() / 2.0, 3.0)
+            } else {
+                ((a.dot(&b.cross(&c)) / 6.0).abs(), 4.0)
+            };
+            sums.amount += own;
+            sums.first += sum * (own / corners);
+            let share = own / (corners * (corners + 1.0));
+            sums.second += (squares + sum * sum.transpose()) * share;
         }
+        sums
     }
-    if kg <= 0.0 {
+}
+
+/// A mesh by MuJoCo's usual rule: the centre of mass follows from the pyramids to the middle of its
+/// surface, and volume and moments from those to the centre of mass. For a closed mesh, both are
+/// exact.
+fn of_mesh(mesh: &Mesh, is_shell: bool) -> SolidMass {
+    let surface = Sums::from(Vector3::zeros(), mesh, true);
+    if surface.amount <= 0.0 {
         return SolidMass::NONE;
     }
-    let com = first / kg;
-    let spread = second - com * com.transpose() * kg;
+    let middle = surface.first / surface.amount;
+    let com = if is_shell {
+        middle
+    } else {
+        let solid = Sums::from(middle, mesh, false);
+        if solid.amount <= 0.0 {
+            return SolidMass::NONE;
+        }
+        middle + solid.first / solid.amount
+    };
+    let sums = Sums::from(com, mesh, is_shell);
     SolidMass {
-        kg,
-        com: middle + com,
-        about_com: Matrix3::identity() * spread.trace() - spread,
+        kg: sums.amount,
+        com,
+        about_com: Matrix3::identity() * sums.second.trace() - sums.second,
     }
 }
 
