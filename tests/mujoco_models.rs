@@ -171,7 +171,7 @@ fn differences(tree: &ModelTree, theirs: &Value) -> Vec<String> {
         });
         let most = wanted.abs().max();
         let near = if has_mesh {
-            ROUNDED_MESH * most
+            ROUNDED_MESH * most + 1e3 * ROUNDED
         } else {
             NEAR * most + ROUNDED
         };
