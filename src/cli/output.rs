@@ -68,7 +68,7 @@ pub fn print_error_text(text: &str) {
         .write_all(printable_in_colour(text).as_bytes());
 }
 
-/// Returns the first `most` faults and, if there are more, one that tells their number.
+/// Returns the first `most` faults and, if there are more, one with their number.
 pub fn first_of(
     faults: Diagnostics,
     most: usize,

@@ -37,7 +37,7 @@ pub struct Span {
 /// program marked.
 ///
 /// Each begins where the one before it ended, because the state after an action is the state before
-/// the next one: what happens between two actions belongs to the later one.
+/// the next one: everything between two actions belongs to the later one.
 pub(crate) fn spans(watched: &Watched<'_>, actions: &[Action]) -> Vec<Span> {
     let mut spans = if actions.is_empty() {
         marked(watched.episode)

@@ -225,7 +225,7 @@ impl RuleBook {
     /// still holds passed vacuously: no `a` held where it matters, so that no `b` was asked for.
     ///
     /// Only right sides count that make the property harder to pass.
-    /// [`RuleBook::can_pass_vacuously`] tells which properties have one.
+    /// [`RuleBook::can_pass_vacuously`] returns the properties that have one.
     pub fn without_consequents(
         &self,
         facts: &ActionFacts<'_>,

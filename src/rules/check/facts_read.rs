@@ -541,7 +541,7 @@ mod tests {
                  good(?x) :- dry(?x) . good(?x) :- after(?x, :full, true) . success(?x) :- good(?x) .",
                 Passed,
             ),
-            // The rule file states what it could also derive.
+            // The rule file states a fact that it could also derive.
             (
                 "wettest(:lake) . wettest(?x) :- after(?x, :wet, true) .
                  success(?x) :- after(?x, :on, :table), ~dirty(?x) . dirty(?x) :- after(?x, :on, :floor), ~wettest(?x) .",
