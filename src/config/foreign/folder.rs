@@ -12,7 +12,7 @@ use crate::foreign::sdf::SdfModel;
 use crate::foreign::urdf::{Materials, Shapeless};
 use crate::foreign::xml::{self, Node, Reader};
 use crate::foreign::{mjcf, sdf, urdf};
-use actcheck_base::{Diagnostic, Diagnostics, FileFault, Files, Severity, did_you_mean};
+use actcheck_base::{Diagnostic, Diagnostics, FileFault, Files, Severity, did_you_mean, xml_text};
 use actcheck_data::ObjectModel;
 
 /// A model found in a folder.
@@ -213,9 +213,11 @@ fn model_file(files: &Files, folder: &Path) -> Option<PathBuf> {
 fn is_mjcf(files: &Files, path: &Path) -> bool {
     let is_xml = path.extension().is_some_and(|ending| ending == "xml");
     is_xml
-        && files
-            .read_bytes(path)
-            .is_ok_and(|bytes| begins_with_mujoco(&String::from_utf8_lossy(&bytes)))
+        && files.read_bytes(path).is_ok_and(|bytes| {
+            // A file with faults in its encoding is MJCF, too; its reader reports them.
+            begins_with_mujoco(&String::from_utf8_lossy(&bytes))
+                || xml_text(bytes).is_ok_and(|text| begins_with_mujoco(&text))
+        })
 }
 
 /// Whether the first element of a text is `<mujoco>`.

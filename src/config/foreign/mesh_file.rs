@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use std::path::Path;
 
 use crate::foreign::collada;
-use actcheck_base::{Diagnostic, Diagnostics, Files, Source};
+use actcheck_base::{Diagnostic, Diagnostics, FileFault, Files, Source, xml_text};
 use actcheck_data::{Mesh, MeshFault};
 
 /// Largest number of triangles: more than any collision shape needs, and a larger file could
@@ -20,8 +20,9 @@ pub(crate) const HOW_TO_NAME: &str = "the URI is `model://NAME/meshes/FILE`, `pa
 pub(crate) enum MeshFileFault {
     #[error("`.{0}` files are not supported")]
     Format(String),
-    #[error("it is not UTF-8 text")]
-    NotText,
+    /// It is a text in an unknown encoding.
+    #[error("{0}")]
+    Text(#[from] FileFault),
     #[error("it ends too early")]
     Cut,
     #[error("its length does not fit the numbers of its vertices and faces")]
@@ -77,7 +78,7 @@ pub(crate) fn read(files: &Files, path: &Path) -> Result<MeshFile, Diagnostics> 
         })),
         "msh" => of_msh(&bytes),
         "dae" => {
-            let text = std::str::from_utf8(&bytes).map_err(|_| unusable(MeshFileFault::NotText))?;
+            let text = xml_text(bytes.clone()).map_err(|fault| unusable(fault.into()))?;
             return collada::read(&Source::new(shown.to_string(), text), &mut warnings).map(
                 |mesh| MeshFile {
                     mesh,
