@@ -6,7 +6,7 @@ use nalgebra::Isometry3;
 
 use crate::foreign::footprint::turned;
 use crate::foreign::lenient::repaired;
-use crate::foreign::lookup::Lookup;
+use crate::foreign::lookup::{Lookup, beside, spellings};
 use crate::foreign::nested::Role;
 use crate::foreign::sdf::SdfModel;
 use crate::foreign::urdf::{Materials, Shapeless};
@@ -176,11 +176,16 @@ pub(crate) fn included<'a>(
 /// Finds a model by its path in the folders. Names of web addresses may differ from folders in case
 /// and spaces.
 fn named(name: &str, lookup: &Lookup) -> Option<Found> {
-    let folder_name = name.to_lowercase().replace(' ', "_");
+    let spellings = spellings(name);
+    let folder_names = spellings.iter().flat_map(|name| {
+        let of_web = name.to_lowercase().replace(' ', "_");
+        [name.clone(), of_web]
+    });
+    let folder_names: Vec<String> = folder_names.collect();
     let places = lookup
         .folders
         .iter()
-        .flat_map(|folder| [folder.join(name), folder.join(&folder_name)]);
+        .flat_map(|folder| folder_names.iter().map(|name| folder.join(name)));
     places
         .filter_map(|place| {
             Some(Found {
@@ -271,10 +276,8 @@ fn sdf_path(config: &Path, files: &Files) -> Result<PathBuf, Diagnostics> {
         );
         return Err(reader.found);
     };
-    let path = config
-        .parent()
-        .unwrap_or(Path::new(""))
-        .join(xml::text(named));
+    let folder = config.parent().unwrap_or(Path::new(""));
+    let path = beside(files, folder, xml::text(named));
     match files.read_bytes(&path) {
         Ok(_) => Ok(path),
         Err(reason) => {
