@@ -1,5 +1,6 @@
 //! Shapes in SDF and URDF.
 
+use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::path::Path;
 
@@ -18,6 +19,8 @@ pub(crate) struct Shapes<'a> {
     pub(crate) digest: Digest,
     /// Number of models that include this file's model.
     pub(crate) depth: usize,
+    /// Warnings about mesh files without a text, each of which is given once.
+    pub(crate) warned: BTreeSet<String>,
 }
 
 /// Help text with the supported kinds of geometry.
@@ -30,6 +33,7 @@ impl<'a> Shapes<'a> {
             path,
             digest: Digest::new(),
             depth: 0,
+            warned: BTreeSet::new(),
         }
     }
 
@@ -100,10 +104,20 @@ impl<'a> Shapes<'a> {
             );
             return None;
         }
+        let source = reader.source;
+        // A fault without a source, as of a binary mesh file, is reported where the file is named.
+        let placed = |fault: Diagnostic| match fault.source {
+            None => fault.at(source, xml::span(node)),
+            Some(_) => fault,
+        };
         match self.mesh_file(uri) {
             Ok(file) => {
                 self.digest.update(&file.bytes);
-                reader.found.extend(file.warnings);
+                let warnings = file.warnings.into_iter().filter(|warning| {
+                    warning.source.is_some() || self.warned.insert(warning.message.clone())
+                });
+                let warnings: Diagnostics = warnings.map(placed).collect();
+                reader.found.extend(warnings);
                 let mesh = file.mesh.scaled(scale);
                 let longest = mesh
                     .vertices
@@ -132,12 +146,6 @@ impl<'a> Shapes<'a> {
                 Some(Shape::Mesh { mesh })
             }
             Err(faults) => {
-                // A fault without a source, as of a binary mesh file, is reported where the file is
-                // named.
-                let placed = |fault: Diagnostic| match fault.source {
-                    None => fault.at(reader.source, xml::span(node)),
-                    Some(_) => fault,
-                };
                 let faults: Diagnostics = faults.into_iter().map(placed).collect();
                 reader.found.extend(faults);
                 None
