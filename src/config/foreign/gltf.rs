@@ -632,7 +632,7 @@ impl Component {
         }
     }
 
-    /// Returns the number from −1 to 1 that an integer stands for.
+    /// Returns the number from −1 to 1 that an integer represents.
     fn normalised(self, number: f64) -> f64 {
         let most = match self.kind {
             BYTE => f64::from(i8::MAX),
@@ -711,7 +711,7 @@ impl Document {
         accessor.ok_or(GltfFault::Missing("accessor", idx))
     }
 
-    /// The nodes that are no other's children.
+    /// The nodes without a parent.
     fn roots(&self) -> Vec<u32> {
         let mut is_root = vec![true; self.nodes.len()];
         for child in self.nodes.iter().flat_map(|node| &node.children) {
