@@ -62,7 +62,7 @@ fn recode(folder: &Path, written: Written) {
                 Some(rest) => rest.split_once("?>").unwrap().1,
                 None => &text,
             };
-            fs::write(&path, written(&format!("<!-- modèlé -->{undeclared}"))).unwrap();
+            fs::write(&path, written(&format!("<!-- modélé -->{undeclared}"))).unwrap();
         }
     }
 }
