@@ -20,7 +20,7 @@
 //!
 //! | crate | purpose | libraries |
 //! | --- | --- | --- |
-//! | [`base`] | sources and diagnostics, terms, facts, findings and outcomes, shipped files, lines for a shell | shlex |
+//! | [`base`] | sources and diagnostics, terms, facts, findings and outcomes, shipped files, lines for a shell | encoding_rs, shlex |
 //! | [`data`] | poses, recorded choices, models, scenes, traces | |
 //! | [`search`] | adaptive sampling of the unit cube, guided by margins; failure rates by importance weighting | statrs |
 //! | [`config`] | TOML text to a fully checked `Campaign`; models in our own and in third-party formats | toml, roxmltree, mesh-loader, shlex |

@@ -59,6 +59,7 @@ mod many_runs;
 mod margins;
 mod merge;
 mod mistakes;
+mod model_files;
 mod model_folders;
 mod models;
 mod more_scenes;

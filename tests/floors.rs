@@ -46,10 +46,11 @@ const FLOORS: [(&str, &[&str]); 20] = [
 ];
 
 /// Libraries of the field and the crates that may depend on them.
-const FENCES: [(&str, &[&str]); 33] = [
+const FENCES: [(&str, &[&str]); 34] = [
     ("toml", &["config"]),
     ("roxmltree", &["config"]),
     ("mesh-loader", &["config"]),
+    ("encoding_rs", &["base"]),
     ("shlex", &["base", "config"]),
     ("nix", &["protocol"]),
     ("statrs", &["search", "analysis"]),

@@ -16,6 +16,7 @@ use actcheck::history::merge::{MergeOptions, carry_out, plan};
 use actcheck::history::{History, RunFilter, RunRecord};
 use actcheck::ontology;
 use actcheck::world;
+use base64::Engine;
 
 use crate::fuzz_corpus::entrances::{frames, histories};
 use crate::history::{sample_campaign, sample_run};
@@ -144,6 +145,13 @@ const DAE: &str = "<COLLADA><asset><unit meter=\"0.01\"/><up_axis>Z_UP</up_axis>
     <scene><instance_visual_scene url=\"#x\"/></scene></COLLADA>";
 const OBJ: &str = "o cube\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvn 0 0 1\nvt 0 0\ng a\nusemtl m\nf 1/1/1 3/1/1 2/1/1\nf 1//1 2//1 4//1\n\
     f -4 -1 -2\nf 2 3 4\n";
+const GLTF: &str = "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"children\":[1],\"scale\":[1,2,3]},\
+    {\"mesh\":0,\"rotation\":[0,0,0,1],\"translation\":[1,2,3]}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"indices\":1},\
+    {\"attributes\":{\"POSITION\":0},\"mode\":5}]}],\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\",\
+    \"sparse\":{\"count\":1,\"indices\":{\"bufferView\":1,\"byteOffset\":3,\"componentType\":5121},\"values\":{\"bufferView\":0}}},\
+    {\"bufferView\":1,\"componentType\":5121,\"count\":12,\"type\":\"SCALAR\"}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":48,\"byteStride\":12},\
+    {\"buffer\":0,\"byteOffset\":48,\"byteLength\":12}],\"buffers\":[{\"byteLength\":60,\"uri\":\"data:;base64,\
+    AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAAAAAAAAAAAAAAAIA/AAIBAAEDAAMCAQID\"}]}";
 const STL: &str = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nfacet normal 0 0 1\n\
     outer loop\nvertex 0 0 0\nvertex 0 0 1\nvertex 1 0 0\nendloop\nendfacet\nendsolid a\n";
 
@@ -165,9 +173,28 @@ fn binary_stl() -> Vec<u8> {
     bytes
 }
 
+/// A file of glTF in parts: that of text without its buffer, and the buffer.
+fn glb() -> Vec<u8> {
+    let (before, after) = GLTF.split_once(",\"uri\":\"").unwrap();
+    let (data, after) = after.split_once('"').unwrap();
+    let (_, data) = data.split_once(',').unwrap();
+    let data = base64::engine::general_purpose::STANDARD
+        .decode(data)
+        .unwrap();
+    let json = format!("{before}{after}").into_bytes();
+    let mut bytes = b"glTF\x02\0\0\0".to_vec();
+    bytes.extend((28 + json.len() as u32 + data.len() as u32).to_le_bytes());
+    for (kind, part) in [(b"JSON", json), (b"BIN\0", data)] {
+        bytes.extend((part.len() as u32).to_le_bytes());
+        bytes.extend(kind);
+        bytes.extend(part);
+    }
+    bytes
+}
+
 #[test]
 fn meshes() {
-    const WORDS: [&str; 16] = [
+    const WORDS: [&str; 24] = [
         "<instance_geometry url=\"#g\"/>",
         "<instance_node url=\"#n\"/>",
         "<node>",
@@ -184,16 +211,27 @@ fn meshes() {
         "endsolid\nsolid b\n",
         "facet normal",
         "vertex 1 1 1\n",
+        "\"byteStride\":0,",
+        "\"uri\":\"m.gltf\",",
+        "\"mode\":6,",
+        "\"children\":[0,1],",
+        "{\"mesh\":0},",
+        "\"extensionsRequired\":[\"A\"],",
+        "\"normalized\":true,",
+        "\"matrix\":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],",
     ];
     let folder = tempfile::tempdir().unwrap();
     let binary = binary_stl();
-    let seeds: [(&str, &[u8]); 4] = [
+    let glb = glb();
+    let seeds: [(&str, &[u8]); 6] = [
+        ("gltf", GLTF.as_bytes()),
+        ("glb", &glb),
         ("dae", DAE.as_bytes()),
         ("obj", OBJ.as_bytes()),
         ("stl", STL.as_bytes()),
         ("stl", binary.as_slice()),
     ];
-    cases("meshes", 200, |mut random| {
+    cases("meshes", 300, |mut random| {
         let (ending, text) = *random.pick(&seeds);
         let mutated = random.text(text, &WORDS, &[DAE.as_bytes()]);
         with_mesh(folder.path(), ending, &mutated);
@@ -203,7 +241,7 @@ fn meshes() {
 
 #[test]
 fn models_and_worlds() {
-    const WORDS: [&str; 22] = [
+    const WORDS: [&str; 25] = [
         "<link name=\"l\">",
         "</link>",
         "<frame name=\"f\" attached_to=\"l\"><pose relative_to=\"j\">0 0 1 0 0 0</pose></frame>",
@@ -226,6 +264,9 @@ fn models_and_worlds() {
         "fixed = true\n",
         "../../..",
         "model://",
+        "%2e%2e%2F",
+        "..\\..\\",
+        "<?xml version='1.0' encoding='utf-16'?>",
     ];
     let folder = tempfile::tempdir().unwrap();
     let robot = std::fs::read("models/robots/fixed_arm.urdf").unwrap();

@@ -3,7 +3,7 @@
 use std::path::{Component, Path, PathBuf};
 
 use crate::shipped;
-use crate::{FileKind, NotPlain, Source, read_regular};
+use crate::{FileKind, NotPlain, Source, read_regular, xml_text};
 
 /// Why a file of a project can't be read: a lower-case sentence without the path.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -27,6 +27,19 @@ pub enum FileFault {
     /// The bytes are not valid UTF-8.
     #[error("it is not UTF-8 text")]
     NotText,
+    /// The encoding of an XML text, by its declaration or its first bytes.
+    #[error("its encoding, `{0}`, is unknown; save it as UTF-8")]
+    Encoding(String),
+    /// Some bytes of an XML text are not in its encoding.
+    #[error(
+        "line {line} is not in its encoding, {encoding}; save it as UTF-8, or state its encoding in the XML declaration"
+    )]
+    NotInEncoding {
+        /// The name in the XML declaration, or that of a byte-order mark.
+        encoding: String,
+        /// The first such line, from 1.
+        line: usize,
+    },
     /// The operating system reports another error, or the file is too large.
     #[error("{0}")]
     System(String),
@@ -65,7 +78,7 @@ impl Files {
     }
 
     /// Reads a text of at most 64 MiB. The source's name is the path, prefixed with `built-in:` for
-    /// embedded files.
+    /// embedded files. XML may have other encodings than UTF-8, see [`xml_text`].
     ///
     /// # Errors
     /// The reason. Devices and pipes are refused: they may have no end.
@@ -86,8 +99,7 @@ impl Files {
             Self::Shipped => format!("built-in:{}", slashed(&normalised(path))),
             Self::Disk => path.display().to_string(),
         };
-        let text =
-            String::from_utf8(self.read_up_to(path, longest)?).map_err(|_| FileFault::NotText)?;
+        let text = xml_text(self.read_up_to(path, longest)?)?;
         Ok(Source::new(name, text))
     }
 

@@ -33,6 +33,7 @@ mod varint;
 mod write_atomic;
 mod xml_guard;
 mod xml_limits;
+mod xml_text;
 
 pub use below::{Below, FileKind, NotPlain, open_regular, read_regular};
 pub use course::{Course, Signal, SignalKey, Solid};
@@ -64,3 +65,4 @@ pub use varint::{ByteReader, put_varint, unzigzag, zigzag};
 pub use write_atomic::NewFile;
 pub use xml_guard::{XmlGuard, XmlProgress};
 pub use xml_limits::check_xml;
+pub use xml_text::xml_text;

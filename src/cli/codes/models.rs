@@ -132,7 +132,7 @@ const CODES_W: &[Code] = &[
         "W037",
         "a mesh can't be used",
         "the file is missing or damaged, or its surface is not closed",
-        "export it again as triangles to stl, obj or dae; use a thin box for a sheet",
+        "export it again as triangles to stl, obj, dae or glb; use a thin box for a sheet",
     ),
     code(
         "W038",

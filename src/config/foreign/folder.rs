@@ -7,12 +7,14 @@ use nalgebra::Isometry3;
 use crate::foreign::footprint::turned;
 use crate::foreign::geometry::Shapes;
 use crate::foreign::lenient::repaired;
-use crate::foreign::lookup::Lookup;
+use crate::foreign::lookup::{Lookup, beside, spellings};
 use crate::foreign::nested::Role;
 use crate::foreign::sdf::SdfModel;
 use crate::foreign::xml::{self, Node, Reader};
 use crate::foreign::{mjcf, sdf, tree_object, urdf};
-use actcheck_base::{Diagnostic, Diagnostics, FileFault, Files, Severity, Source, did_you_mean};
+use actcheck_base::{
+    Diagnostic, Diagnostics, FileFault, Files, Severity, Source, did_you_mean, xml_text,
+};
 use actcheck_data::ObjectModel;
 
 /// A model found in a folder.
@@ -200,11 +202,16 @@ pub(crate) fn included<'a>(
 /// Finds a model by its path in the folders. Names of web addresses may differ from folders in case
 /// and spaces.
 fn named(name: &str, lookup: &Lookup) -> Option<Found> {
-    let folder_name = name.to_lowercase().replace(' ', "_");
+    let spellings = spellings(name);
+    let folder_names = spellings.iter().flat_map(|name| {
+        let of_web = name.to_lowercase().replace(' ', "_");
+        [name.clone(), of_web]
+    });
+    let folder_names: Vec<String> = folder_names.collect();
     let places = lookup
         .folders
         .iter()
-        .flat_map(|folder| [folder.join(name), folder.join(&folder_name)]);
+        .flat_map(|folder| folder_names.iter().map(|name| folder.join(name)));
     places
         .filter_map(|place| {
             Some(Found {
@@ -237,9 +244,11 @@ fn model_file(files: &Files, folder: &Path) -> Option<PathBuf> {
 fn is_mjcf(files: &Files, path: &Path) -> bool {
     let is_xml = path.extension().is_some_and(|ending| ending == "xml");
     is_xml
-        && files
-            .read_bytes(path)
-            .is_ok_and(|bytes| begins_with_mujoco(&String::from_utf8_lossy(&bytes)))
+        && files.read_bytes(path).is_ok_and(|bytes| {
+            // A file with faults in its encoding is MJCF, too; its reader reports them.
+            begins_with_mujoco(&String::from_utf8_lossy(&bytes))
+                || xml_text(bytes).is_ok_and(|text| begins_with_mujoco(&text))
+        })
 }
 
 /// Whether the first element of a text is `<mujoco>`.
@@ -293,10 +302,8 @@ fn sdf_path(config: &Path, files: &Files) -> Result<PathBuf, Diagnostics> {
         );
         return Err(reader.found);
     };
-    let path = config
-        .parent()
-        .unwrap_or(Path::new(""))
-        .join(xml::text(named));
+    let folder = config.parent().unwrap_or(Path::new(""));
+    let path = beside(files, folder, xml::text(named));
     match files.read_bytes(&path) {
         Ok(_) => Ok(path),
         Err(reason) => {

@@ -1,6 +1,6 @@
 //! Shapes in SDF and URDF.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 use std::path::Path;
 
@@ -19,6 +19,8 @@ pub(crate) struct Shapes<'a> {
     pub(crate) digest: Digest,
     /// Number of models that include this file's model.
     pub(crate) depth: usize,
+    /// Warnings about mesh files without a text, each of which is given once.
+    pub(crate) warned: BTreeSet<String>,
 }
 
 /// Help text with the supported kinds of geometry.
@@ -31,6 +33,7 @@ impl<'a> Shapes<'a> {
             path,
             digest: Digest::new(),
             depth: 0,
+            warned: BTreeSet::new(),
         }
     }
 
@@ -110,21 +113,23 @@ impl<'a> Shapes<'a> {
             found.push(at_place(fault).help("write 1 for the file's own size"));
             return None;
         }
+        // A fault without a source, as of a binary mesh file, is reported where the file is named.
+        let placed = |fault: Diagnostic| match fault.source {
+            None => at_place(fault),
+            Some(_) => fault,
+        };
         let file = match self.mesh_file(uri) {
             Ok(file) => file,
             Err(faults) => {
-                // A fault without a source, as of a binary mesh file, is reported where the file is
-                // named.
-                let placed = |fault: Diagnostic| match fault.source {
-                    None => at_place(fault),
-                    Some(_) => fault,
-                };
                 found.extend(faults.into_iter().map(placed).collect());
                 return None;
             }
         };
         self.digest.update(&file.bytes);
-        found.extend(file.warnings);
+        let warnings = file.warnings.into_iter().filter(|warning| {
+            warning.source.is_some() || self.warned.insert(warning.message.clone())
+        });
+        found.extend(warnings.map(placed).collect());
         let mesh = file.mesh.scaled(scale);
         let longest = mesh
             .vertices

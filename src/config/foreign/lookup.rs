@@ -24,32 +24,33 @@ pub(crate) struct Lookup<'a> {
 }
 
 impl Lookup<'_> {
-    /// Returns the path of a URI in a file. A URI without a scheme is relative to that file.
+    /// Returns the path of a URI in a file. A URI without a scheme is relative to that file. If the
+    /// path as written does not exist, its other [`spellings`] are tried.
     ///
     /// # Errors
     /// [`UriFault`] if the file does not exist or the scheme is not supported.
     pub(crate) fn resolve(&self, uri: &str, file: &Path) -> Result<PathBuf, UriFault> {
-        let beside = file.parent().unwrap_or(Path::new(""));
-        match uri.split_once("://") {
-            None => {
-                // PyBullet's models write paths from the folder of the file as if they were
-                // absolute.
-                let inside = beside.join(uri.trim_start_matches('/'));
-                let is_elsewhere =
-                    uri.starts_with('/') && !self.exists(Path::new(uri)) && self.exists(&inside);
-                Ok(if is_elsewhere {
-                    inside
-                } else {
-                    self.find_end(uri).unwrap_or_else(|| beside.join(uri))
-                })
-            }
-            Some(("file", path)) => {
-                let found = self
-                    .find_beside(Path::new(path))
-                    .or_else(|| self.find_end(path));
-                Ok(found.unwrap_or_else(|| PathBuf::from(path)))
-            }
-            Some(("model" | "package", path)) => self.find(path).ok_or_else(|| {
+        let written = self.resolve_spelling(uri, file);
+        if written.as_ref().is_ok_and(|path| self.exists(path)) {
+            return written;
+        }
+        spellings(uri)
+            .iter()
+            .skip(1)
+            .filter_map(|spelling| self.resolve_spelling(spelling, file).ok())
+            .find(|path| self.exists(path))
+            .map_or(written, Ok)
+    }
+
+    fn resolve_spelling(&self, uri: &str, file: &Path) -> Result<PathBuf, UriFault> {
+        let (scheme, path) = split(uri);
+        match scheme.to_ascii_lowercase().as_str() {
+            "" => Ok(self.of_path(path, file)),
+            "file" => Ok(self
+                .find_beside(Path::new(path))
+                .or_else(|| self.find_end(path))
+                .unwrap_or_else(|| PathBuf::from(path))),
+            "model" | "package" => self.find(path).ok_or_else(|| {
                 let folders: Vec<String> = self
                     .folders
                     .iter()
@@ -60,8 +61,19 @@ impl Lookup<'_> {
                     folders: folders.join(" or "),
                 }
             }),
-            Some((scheme, _)) => Err(UriFault::Scheme(scheme.to_owned())),
+            _ => Err(UriFault::Scheme(scheme.to_owned())),
         }
+    }
+
+    /// The path of a URI without a scheme.
+    fn of_path(&self, path: &str, file: &Path) -> PathBuf {
+        let beside = file.parent().unwrap_or(Path::new(""));
+        // PyBullet's models write paths from the folder of the file as if they were absolute.
+        let inside = beside.join(path.trim_start_matches('/'));
+        if path.starts_with('/') && !self.exists(Path::new(path)) && self.exists(&inside) {
+            return inside;
+        }
+        self.find_end(path).unwrap_or_else(|| beside.join(path))
     }
 
     fn find(&self, path: &str) -> Option<PathBuf> {
@@ -104,10 +116,7 @@ impl Lookup<'_> {
     }
 
     fn exists(&self, place: &Path) -> bool {
-        self.files
-            .list(place.parent().unwrap_or(place))
-            .iter()
-            .any(|known| known == place)
+        exists(self.files, place)
     }
 
     /// The path in a folder that is the package itself, by its name or that in its `package.xml`.
@@ -130,5 +139,187 @@ impl Lookup<'_> {
         let (_, rest) = manifest.text.split_once("<name>")?;
         let (name, _) = rest.split_once("</name>")?;
         Some(name.trim().to_owned())
+    }
+}
+
+/// Returns the scheme of a URI and the path after it. A path has the scheme "", and so has one that
+/// begins with the letter of a drive, which is removed: the drive is that of another machine.
+fn split(uri: &str) -> (&str, &str) {
+    let Some((scheme, rest)) = uri.split_once(':') else {
+        return ("", uri);
+    };
+    let is_file = scheme.eq_ignore_ascii_case("file");
+    let is_drive = scheme.len() == 1 && rest.starts_with('/');
+    match rest.strip_prefix("//") {
+        _ if is_drive => ("", rest),
+        Some(path) if is_file && path.starts_with("localhost/") => {
+            (scheme, &path["localhost".len()..])
+        }
+        Some(path) => (scheme, path),
+        None if is_file => (scheme, rest),
+        None => ("", uri),
+    }
+}
+
+/// Returns the spellings of a path or URI in which it may name a file, as written first: with the
+/// backslashes of Windows as slashes, with percent-encoded characters decoded, and with both.
+pub(crate) fn spellings(written: &str) -> Vec<String> {
+    let slashed = written.replace('\\', "/");
+    let mut spellings = vec![written.to_owned()];
+    for other in [
+        slashed.clone(),
+        percent_decoded(written),
+        percent_decoded(&slashed),
+    ] {
+        if !spellings.contains(&other) {
+            spellings.push(other);
+        }
+    }
+    spellings
+}
+
+/// Returns the path of a file that another file in this folder names: of its [`spellings`] the
+/// first that exists, or else as written.
+pub(crate) fn beside(files: &Files, folder: &Path, written: &str) -> PathBuf {
+    let spelled = spellings(written)
+        .into_iter()
+        .map(|path| folder.join(path))
+        .find(|place| exists(files, place));
+    spelled.unwrap_or_else(|| folder.join(written))
+}
+
+fn exists(files: &Files, place: &Path) -> bool {
+    files
+        .list(place.parent().unwrap_or(place))
+        .iter()
+        .any(|known| known == place)
+}
+
+/// Decodes percent-encoded characters in each part of a path. A part stays as it is if it would
+/// become another path: `%2F` and `%5C` do not separate folders, and `%2E%2E` is a name.
+fn percent_decoded(path: &str) -> String {
+    let parts = path.split('/').map(|part| {
+        let decoded = decoded_part(part)
+            .filter(|decoded| !decoded.contains(['/', '\\', '\0']))
+            .filter(|decoded| !matches!(decoded.as_str(), "" | "." | ".."));
+        decoded.unwrap_or_else(|| part.to_owned())
+    });
+    parts.collect::<Vec<_>>().join("/")
+}
+
+/// Decodes `%20` and the like; a `%` that begins no two hexadecimal digits stays. Returns `None` if
+/// the result is not UTF-8.
+fn decoded_part(part: &str) -> Option<String> {
+    let mut bytes = Vec::with_capacity(part.len());
+    let mut rest = part.as_bytes();
+    while let Some((first, behind)) = rest.split_first() {
+        let digit = |at: usize| char::from(*behind.get(at)?).to_digit(16);
+        let code = (*first == b'%').then(|| Some(16 * digit(0)? + digit(1)?));
+        match code.flatten().and_then(|code| u8::try_from(code).ok()) {
+            Some(code) => {
+                bytes.push(code);
+                rest = &behind[2..];
+            }
+            None => {
+                bytes.push(*first);
+                rest = behind;
+            }
+        }
+    }
+    String::from_utf8(bytes).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percent_encoded_characters_are_decoded_but_separate_no_folders() {
+        for (path, decoded) in [
+            ("my%20meshes/f%201.stl", "my meshes/f 1.stl"),
+            ("package://a%20b/%C3%A9.stl", "package://a b/é.stl"),
+            ("100%.stl", "100%.stl"),
+            ("50%25 %zz.stl", "50% %zz.stl"),
+            ("a%2Fb/c%5cd.stl", "a%2Fb/c%5cd.stl"),
+            ("%2e%2E/a.stl", "%2e%2E/a.stl"),
+            ("../%2e/a.stl", "../%2e/a.stl"),
+            ("%2e%2e%2fa.stl", "%2e%2e%2fa.stl"),
+            ("a%00.stl", "a%00.stl"),
+            ("%e9.stl", "%e9.stl"),
+            ("%252e%252e/a", "%2e%2e/a"),
+            ("é%", "é%"),
+        ] {
+            assert_eq!(percent_decoded(path), decoded);
+        }
+    }
+
+    /// Every way to write a path leads to the file, and the path as written comes first.
+    #[test]
+    fn paths_are_found_in_all_spellings() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let root = folder.path();
+        let (written, outside) = (root.join("robot/arm.urdf"), root.join("secret.stl"));
+        for file in [
+            "robot/my meshes/f 1.stl",
+            "robot/my meshes/g%201.stl",
+            "robot/my meshes/g 1.stl",
+            "robot/plain.stl",
+            "secret.stl",
+        ] {
+            let path = root.join(file);
+            std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
+            std::fs::write(path, "").expect("a file");
+        }
+        let lookup = Lookup {
+            files: &Files::Disk,
+            folders: vec![root.to_path_buf()],
+        };
+        let found = |uri: &str| {
+            lookup
+                .resolve(uri, &written)
+                .map(|path| (path.is_file(), path))
+        };
+        let absolute = root.join("robot/plain.stl").display().to_string();
+        for uri in [
+            "my meshes/f 1.stl",
+            "my%20meshes/f%201.stl",
+            "my meshes\\f 1.stl",
+            ".\\my%20meshes\\f 1.stl",
+            "..\\robot\\my meshes\\\\f 1.stl",
+            "package://robot/my%20meshes/f%201.stl",
+            "package://robot\\my meshes\\f 1.stl",
+            "package:\\\\robot\\my meshes\\f 1.stl",
+            "model://robot/my%20meshes\\f%201.stl",
+            "file://robot/plain.stl",
+            "FILE://robot/plain.stl",
+            "file:robot/plain.stl",
+            "C:\\ws\\src\\robot\\my meshes\\f 1.stl",
+            "file:///C:/ws/robot/plain.stl",
+            &format!("file://{absolute}"),
+            &format!("file:{absolute}"),
+            &format!("file://localhost{absolute}"),
+            &absolute,
+        ] {
+            assert!(found(uri).is_ok_and(|(exists, _)| exists), "{uri}");
+        }
+        let as_written = found("my meshes/g%201.stl").expect("it exists").1;
+        assert!(as_written.ends_with("g%201.stl"), "{as_written:?}");
+        for uri in [
+            "%2e%2e/secret.stl",
+            "..%2fsecret.stl",
+            "..%5Csecret.stl",
+            "package://robot/%2e%2e/secret.stl",
+            "plain.stl%00.txt",
+        ] {
+            assert!(
+                found(uri).is_ok_and(|(exists, _)| !exists) || found(uri).is_err(),
+                "{uri}"
+            );
+        }
+        assert!(outside.is_file());
+        assert_eq!(
+            found("https://a/b.stl").map(|(_, path)| path),
+            Err(UriFault::Scheme("https".to_owned()))
+        );
     }
 }

@@ -1,11 +1,12 @@
 //! Reads mesh files: stl and obj with the `mesh_loader` crate, dae with
-//! [`collada`](super::collada), and MuJoCo's msh.
+//! [`collada`](super::collada), glb and gltf with [`gltf`](super::gltf), and MuJoCo's msh.
 
 use std::borrow::Cow;
 use std::path::Path;
 
-use crate::foreign::collada;
-use actcheck_base::{Diagnostic, Diagnostics, Files, Source};
+use crate::foreign::gltf::GltfFault;
+use crate::foreign::{collada, gltf};
+use actcheck_base::{Diagnostic, Diagnostics, FileFault, Files, Source, xml_text};
 use actcheck_data::{Mesh, MeshFault};
 
 /// Largest number of triangles: more than any collision shape needs, and a larger file could
@@ -20,8 +21,9 @@ pub(crate) const HOW_TO_NAME: &str = "the URI is `model://NAME/meshes/FILE`, `pa
 pub(crate) enum MeshFileFault {
     #[error("`.{0}` files are not supported")]
     Format(String),
-    #[error("it is not UTF-8 text")]
-    NotText,
+    /// It is a text in an unknown encoding.
+    #[error("{0}")]
+    Text(#[from] FileFault),
     #[error("it ends too early")]
     Cut,
     #[error("its length does not fit the numbers of its vertices and faces")]
@@ -30,6 +32,8 @@ pub(crate) enum MeshFileFault {
     TooLarge,
     #[error("it has {0} triangles, more than {MOST_TRIANGLES}")]
     TooManyTriangles(usize),
+    #[error("{0}")]
+    Gltf(#[from] GltfFault),
     /// The reader of the format does not accept it.
     #[error("{0}")]
     Syntax(String),
@@ -41,7 +45,7 @@ pub(crate) enum MeshFileFault {
 /// The contents of a mesh file.
 pub(crate) struct MeshFile {
     pub(crate) mesh: Mesh,
-    /// Its bytes, for digests.
+    /// Its bytes and those of its other files, for digests.
     pub(crate) bytes: Vec<u8>,
     /// Warnings about ignored elements.
     pub(crate) warnings: Diagnostics,
@@ -54,7 +58,7 @@ pub(crate) struct MeshFile {
 /// triangles.
 pub(crate) fn read(files: &Files, path: &Path) -> Result<MeshFile, Diagnostics> {
     let shown = path.display();
-    let bytes = files.read_bytes(path).map_err(|reason| -> Diagnostics {
+    let mut bytes = files.read_bytes(path).map_err(|reason| -> Diagnostics {
         Diagnostic::error("W037", format!("cannot read the mesh {shown}: {reason}"))
             .help(HOW_TO_NAME)
             .into()
@@ -66,7 +70,7 @@ pub(crate) fn read(files: &Files, path: &Path) -> Result<MeshFile, Diagnostics> 
     let mut warnings = Diagnostics::new();
     let unusable = |reason: MeshFileFault| -> Diagnostics {
         Diagnostic::error("W037", format!("the mesh {shown} is unusable: {reason}"))
-            .help("export it again, as triangles, to stl, obj or dae")
+            .help("export it again, as triangles, to stl, obj, dae or glb")
             .into()
     };
     let mesh = match ending.as_str() {
@@ -76,8 +80,12 @@ pub(crate) fn read(files: &Files, path: &Path) -> Result<MeshFile, Diagnostics> 
             Ok(Vec::new())
         })),
         "msh" => of_msh(&bytes),
+        "glb" | "gltf" => gltf::read(files, path, &bytes, &mut warnings).map(|read| {
+            bytes.extend(read.others);
+            read.mesh
+        }),
         "dae" => {
-            let text = std::str::from_utf8(&bytes).map_err(|_| unusable(MeshFileFault::NotText))?;
+            let text = xml_text(bytes.clone()).map_err(|fault| unusable(fault.into()))?;
             return collada::read(&Source::new(shown.to_string(), text), &mut warnings).map(
                 |mesh| MeshFile {
                     mesh,

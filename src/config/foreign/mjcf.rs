@@ -10,7 +10,7 @@ use std::rc::Rc;
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
-use crate::foreign::lookup::Lookup;
+use crate::foreign::lookup::{Lookup, beside};
 use crate::foreign::mjcf_compiler::{Attributes, Compiler, Item, Whole, with_includes};
 use crate::foreign::mjcf_couplings::{Couplings, elements};
 use crate::foreign::mjcf_masks::{Mask, collides};
@@ -320,7 +320,7 @@ impl Model<'_> {
             ));
         };
         let folder = self.file.path.parent().unwrap_or(Path::new(""));
-        let path = folder.join(file);
+        let path = beside(self.file.lookup.files, folder, file);
         if self.file.depth >= DEEPEST {
             return refused(format!(
                 "`{file}` is attached {DEEPEST} models deep: it may attach itself"

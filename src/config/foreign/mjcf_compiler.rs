@@ -7,6 +7,7 @@ use nalgebra::{
     Isometry3, Matrix3, Quaternion, Rotation3, Translation3, Unit, UnitQuaternion, Vector3,
 };
 
+use crate::foreign::lookup::beside;
 use crate::foreign::xml::{self, Bound, Node, Pieces, Reader};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Source, did_you_mean};
 use actcheck_data::TreeInertial;
@@ -585,7 +586,8 @@ fn kind(element: &str) -> &str {
 
 /// The name of a file without its folders and its ending.
 fn stem(file: &str) -> Option<String> {
-    let stem = Path::new(file).file_stem()?;
+    let last = file.rsplit(['/', '\\']).next().unwrap_or(file);
+    let stem = Path::new(last).file_stem()?;
     Some(stem.to_string_lossy().into_owned())
 }
 
@@ -701,7 +703,7 @@ impl Splice<'_> {
     fn read(&self, file: &str, folders: [&Path; 2]) -> Result<(PathBuf, Source), String> {
         let mut reasons = Vec::new();
         for folder in folders {
-            let path = folder.join(file);
+            let path = beside(self.files, folder, file);
             match self.files.read(&path) {
                 Ok(found) => return Ok((path, found)),
                 Err(reason) => reasons.push(format!("cannot read {}: {reason}", path.display())),

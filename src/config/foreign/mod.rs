@@ -12,6 +12,8 @@ mod folder;
 mod footprint;
 mod fronts;
 mod geometry;
+mod gltf;
+mod gltf_document;
 mod hull;
 pub(crate) mod lenient;
 mod lookup;
