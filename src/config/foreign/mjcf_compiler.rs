@@ -63,6 +63,8 @@ pub(super) struct Compiler {
     pub(super) paired: BTreeSet<String>,
     /// The basis of masses.
     pub(super) masses: MassRules,
+    /// Whether primitives are fitted to the boxes around meshes instead of to their moments.
+    pub(super) fits_boxes: bool,
 }
 
 /// A mesh of a file.
@@ -190,6 +192,7 @@ impl Compiler {
             models: BTreeMap::new(),
             paired: BTreeSet::new(),
             masses: MassRules::default(),
+            fits_boxes: false,
         };
         if root.tag_name().name() != "mujoco" {
             let message = format!(
@@ -247,6 +250,7 @@ impl Compiler {
         if let Some(strips) = settings.attribute("strippath") {
             folders.strips = strips == "true";
         }
+        self.fits_boxes |= settings.attribute("fitaabb") == Some("true");
         if settings.attribute("coordinate") == Some("global") {
             let message = "global coordinates are not read".to_owned();
             let help = "write local ones, as MuJoCo 2.3.3 and later need them";

@@ -27,6 +27,17 @@ pub(super) struct Couplings {
 
 impl Couplings {
     pub(super) fn read(root: Node, compiler: &Compiler, reader: &mut Reader) -> Self {
+        for tendon in elements(root, "tendon").filter(|tendon| tendon.has_tag_name("spatial")) {
+            let name = tendon.attribute("name").unwrap_or_default();
+            let message = format!("the spatial tendon `{name}` is left out: it pulls nothing");
+            let help = "the joints that it moves are free here, or follow their equalities";
+            reader.warning("W036", tendon, message, help);
+        }
+        for soft in elements(root, "deformable") {
+            let name = soft.tag_name().name();
+            let message = format!("`<{name}>` can't be simulated: bodies are rigid here");
+            reader.error("W035", soft, message, "leave it out");
+        }
         let tendons = tendons(root);
         let tree = BodyTree::read(root, compiler, reader);
         let mut found = Self {

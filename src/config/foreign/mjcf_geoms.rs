@@ -212,6 +212,13 @@ impl<'a> Model<'a> {
     ) -> Option<Placed> {
         let name = attributes.get("mesh").unwrap_or_default();
         let asset = self.asset(name, geom, reader)?;
+        if self.compiler.fits_boxes {
+            let message =
+                "`fitaabb` is not read: a primitive can't be fitted to the box around a mesh";
+            let help = "state the `size` of the geom, and leave out its `mesh`";
+            reader.error("W035", geom, message.to_owned(), help);
+            return None;
+        }
         let mesh = self.vertices(&asset, geom, reader)?;
         let Some((pose, half)) = equivalent_box(&mesh) else {
             let message = format!("the mesh `{name}` has no volume to fit a primitive to");
