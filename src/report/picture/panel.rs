@@ -4,17 +4,17 @@ use std::collections::BTreeMap;
 
 use crate::picture::drawing::{Drawing, Line, Paint, Rect, Style, Words};
 use crate::picture::labels::{Label, Labels};
-use crate::picture::outline::silhouette;
-use crate::picture::paths::{Mover, Path, pose_at};
+use crate::picture::outline::{bounds_of, silhouette};
+use crate::picture::paths::{Mover, Path};
 use crate::picture::window::{Bounds, Window};
 use crate::picture::{font, paint};
 use crate::pressed::Pressed;
 use actcheck_base::names;
 use actcheck_data::{BodyState, Form, Part, Role, Shape, Snapshot, Trace};
 
-/// Upper bound of a link's extent from its origin. Links farther than this outside of the window
+/// Links farther than this outside of the window, such as those behind the things of a side view,
 /// are omitted. Unit: metres.
-const LINK_REACH_M: f64 = 0.8;
+const BESIDE_M: f64 = 0.6;
 
 /// Radius of the star at the hardest contact. Unit: pixels.
 const STAR_PX: f64 = 11.0;
@@ -86,7 +86,7 @@ pub(super) fn draw(
             paint::movable(data.role(body)),
         );
     }
-    robot(drawing, data, moment, window);
+    robot(drawing, data.trace, snapshot, window);
     heading(drawing, snapshot.robot.base_true, window);
     match moment {
         Moment::Before => percepts(drawing, data.trace, window),
@@ -127,26 +127,14 @@ fn form(data: &PanelData<'_>, body: &BodyState, window: &Window) -> Vec<Vec<[f64
     }
 }
 
-/// Draws the robot's links as in the first or last frame.
-fn robot(drawing: &mut Drawing, data: &PanelData<'_>, moment: Moment, window: &Window) {
-    let frames = &data.trace.frames;
-    let row = if moment == Moment::Before {
-        0
-    } else {
-        frames.rows.len().saturating_sub(1)
-    };
-    // Objects have tracks too.
-    let links = frames
-        .names
-        .iter()
-        .enumerate()
-        .filter(|(_, name)| name.starts_with("robot/"));
-    let links = links.filter_map(|(slot, name)| {
-        let form = data.forms.get(name.as_str())?;
-        let pose = pose_at(data.trace, row, slot)?;
-        let around = Bounds::point(pose.translation.vector.into()).grown(LINK_REACH_M);
+/// Draws all links of the robot, also those that are fixed to a fixed base.
+fn robot(drawing: &mut Drawing, trace: &Trace, snapshot: &Snapshot, window: &Window) {
+    let links = trace.linked_forms(snapshot).filter_map(|(form, pose)| {
+        let pose = pose.to_isometry();
+        let origin = Bounds::point(pose.translation.vector.into());
+        let around = bounds_of(&form.parts, &pose).map_or(origin, |shapes| shapes.with(origin));
         window
-            .overlaps(&around)
+            .overlaps(&around.grown(BESIDE_M))
             .then(|| silhouette(&form.parts, &pose, window))
     });
     drawing.shape(links.flatten().collect(), true, paint::ROBOT);
