@@ -62,14 +62,21 @@ pub(super) fn implausible(campaign: &Campaign) -> Diagnostics {
     let of_models = models
         .filter(|model| used.contains(&model.name))
         .flat_map(|model| {
-            let bodies = std::iter::once(model.as_ref()).chain(of_parts(model));
-            bodies
-                .filter_map(implausible_density)
-                .chain(implausible_size(model))
-                .map(|(message, help)| warning(campaign, &model.name, message, help))
-                .collect::<Vec<_>>()
+            let found = faults_of(model).into_iter();
+            found.map(move |(message, help)| warning(campaign, &model.name, message, help))
         });
     of_models.chain(implausible_robot(campaign)).collect()
+}
+
+/// The faults of a model, with their help. One of its size makes its densities wrong, too.
+fn faults_of(model: &ObjectModel) -> Vec<(String, &'static str)> {
+    match implausible_size(model) {
+        Some(fault) => vec![fault],
+        None => std::iter::once(model)
+            .chain(of_parts(model))
+            .filter_map(implausible_density)
+            .collect(),
+    }
 }
 
 /// The models that the configuration names, by name.
