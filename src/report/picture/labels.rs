@@ -11,6 +11,8 @@ const GAP_PX: f64 = 2.0;
 const COVERS: f64 = 1e3;
 /// Cost of a label that hides other objects with all of its area. Unit: pixels.
 const HIDES_PX: f64 = 40.0;
+/// Cost of a label that lies on lines or on the robot with all of its area. Unit: pixels.
+const BUSY_PX: f64 = 25.0;
 /// Largest width of a label, as a share of the panel's: others would lie across everything.
 const WIDEST: f64 = 0.45;
 /// Steps between the places of a label on its object, in each direction.
@@ -24,6 +26,8 @@ pub(super) struct Labels {
     taken: Vec<Rect>,
     /// Objects that labels should not hide.
     things: Vec<Rect>,
+    /// Lines and shapes on which labels are hard to read.
+    busy: Vec<Rect>,
 }
 
 /// A label to place.
@@ -42,7 +46,13 @@ impl Labels {
             panel: panel.grown(-3.0),
             taken: Vec::new(),
             things,
+            busy: Vec::new(),
         }
+    }
+
+    /// Lets labels rather be beside some rectangles.
+    pub(super) fn spare(&mut self, busy: impl IntoIterator<Item = Rect>) {
+        self.busy.extend(busy);
     }
 
     /// Keeps labels out of a rectangle.
@@ -93,7 +103,11 @@ impl Labels {
         let hidden: f64 = self.things.iter().map(|thing| thing.shared(place)).sum();
         let area = place.width * place.height;
         let covers = if at.shared(place) > 0.0 { COVERS } else { 0.0 };
-        gap(place, at) + HIDES_PX * (hidden / area).min(2.0) + covers
+        let crossed: f64 = self.busy.iter().map(|busy| busy.shared(place)).sum();
+        gap(place, at)
+            + HIDES_PX * (hidden / area).min(2.0)
+            + BUSY_PX * (crossed / area).min(1.0)
+            + covers
     }
 }
 
