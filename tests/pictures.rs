@@ -85,6 +85,11 @@ fn a_pick_is_drawn_as_png_and_svg() {
             .any(|word| word.starts_with(&format!("{run} · Pick"))),
         "{words:?}"
     );
+    for node in tree.descendants().filter(|node| node.has_tag_name("text")) {
+        let number = |name: &str| -> f64 { node.attribute(name).unwrap().parse().unwrap() };
+        let [left, right] = [number("x"), number("x") + number("textLength")];
+        assert!(left >= 0.0 && right <= 1200.0, "{:?}", node.text());
+    }
     // The same run gives the same picture.
     assert_eq!(draw(project.path(), &run, "again.svg"), lines.as_bytes());
 }
@@ -239,18 +244,13 @@ fn the_pedestal_of_a_fixed_robot_is_drawn() {
         (corners.len() == 4).then(|| side(0) / side(1))
     };
     let ratios: Vec<f64> = outlines_of_robot(&tree).iter().filter_map(sides).collect();
-    let count = |ratio: f64| {
-        ratios
-            .iter()
-            .filter(|of| (*of - ratio).abs() < 0.01)
-            .count()
+    // The robot is turned a little, which makes its side wider.
+    let count = |low: f64, high: f64| {
+        let between = ratios.iter().filter(|ratio| (low..high).contains(*ratio));
+        between.count()
     };
-    assert_eq!(
-        count(24.0 / 40.0),
-        2,
-        "before and after, from the side: {ratios:?}"
-    );
-    assert!(count(1.0) >= 2, "before and after, from above: {ratios:?}");
+    let (side, above) = (count(0.595, 0.68), count(0.99, 1.01));
+    assert!(side == 2 && above >= 2, "before and after: {ratios:?}");
 }
 
 /// The links of the base have no shapes and so no track: none of the links that move is the base.

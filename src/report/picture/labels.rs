@@ -225,7 +225,7 @@ mod tests {
                 .map(move |size| (name, size))
         }) {
             for step in 0..60 {
-                let share = |stride: f64| (f64::from(step) * stride).fract();
+                let share = |stride: f64| 0.05 + 0.9 * (f64::from(step) * stride).fract();
                 let at = Rect {
                     left: PANEL.left + share(0.618) * PANEL.width - size / 2.0,
                     top: PANEL.top + share(0.755) * PANEL.height - size / 2.0,
