@@ -80,6 +80,7 @@ mod perceive;
 mod physics;
 mod pictures;
 mod place;
+mod plausible;
 mod preconditions;
 mod proofs;
 mod protocol;

@@ -11,7 +11,7 @@ use actcheck::data::Choices;
 use actcheck::report::{Caption, run_picture};
 use tiny_skia::Pixmap;
 
-use crate::support::{actcheck, edit, project, stderr, stdout};
+use crate::support::{actcheck, edit, project, root, stderr, stdout};
 
 /// The id of the first run of a new campaign.
 fn first_run(folder: &Path, config: &str) -> String {
@@ -85,6 +85,11 @@ fn a_pick_is_drawn_as_png_and_svg() {
             .any(|word| word.starts_with(&format!("{run} · Pick"))),
         "{words:?}"
     );
+    for node in tree.descendants().filter(|node| node.has_tag_name("text")) {
+        let number = |name: &str| -> f64 { node.attribute(name).unwrap().parse().unwrap() };
+        let [left, right] = [number("x"), number("x") + number("textLength")];
+        assert!(left >= 0.0 && right <= 1200.0, "{:?}", node.text());
+    }
     // The same run gives the same picture.
     assert_eq!(draw(project.path(), &run, "again.svg"), lines.as_bytes());
 }
@@ -186,6 +191,81 @@ fn the_hardest_contact_is_marked_with_its_time_and_position() {
         .unwrap();
     assert!(force >= 70.0, "{label}");
     assert!(words.contains(&"hardest unwanted contact"), "{words:?}");
+}
+
+/// The outlines of the robot in a picture, one list of corners each. Unit: pixels.
+fn outlines_of_robot(tree: &roxmltree::Document) -> Vec<Vec<[f64; 2]>> {
+    let of_robot = tree
+        .descendants()
+        .filter(|node| node.attribute("fill") == Some("#5a7a99"));
+    let paths = of_robot.filter_map(|node| node.attribute("d"));
+    let polygons = paths.flat_map(|path| path.split('Z').filter(|part| !part.is_empty()));
+    let corner = |pair: &str| {
+        let (x, y) = pair.split_once(',').unwrap();
+        [x, y].map(|number| number.parse().unwrap())
+    };
+    polygons
+        .map(|part| {
+            let corners = part.trim_start_matches('M').split(' ');
+            corners.map(corner).collect()
+        })
+        .collect()
+}
+
+/// Runs a pick with a robot of `tests/data/robots`, and draws it.
+fn drawn_robot(robot: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let file = root().join("tests/data/robots").join(robot);
+    std::fs::copy(file, folder.path().join(robot)).unwrap();
+    let config = "tests = [[\"Pick\"]]\ntest_count = 1\nseed = 7\n\
+        [objectSurface]\nobject_surfaces = [\"mini_coffee_table\"]\n\
+        [pickObject]\nmodel_list = [\"can\"]\n[robot]\nprofile = \"robot.toml\"\n";
+    std::fs::write(folder.path().join("c.toml"), config).unwrap();
+    let proposed = actcheck(
+        folder.path(),
+        &["new", "robot", robot, "--out", "robot.toml"],
+    );
+    assert_eq!(proposed.status.code(), Some(0), "{}", stderr(&proposed));
+    let run = first_run(folder.path(), "c.toml");
+    String::from_utf8(draw(folder.path(), &run, "run.svg")).unwrap()
+}
+
+/// A link that is fixed to a fixed base has no track. Its box of 24 cm × 24 cm × 40 cm is drawn in
+/// the views from the side and from above.
+#[test]
+fn the_pedestal_of_a_fixed_robot_is_drawn() {
+    let lines = drawn_robot("arm_on_a_pedestal.xml");
+    let tree = roxmltree::Document::parse(&lines).unwrap();
+    let sides = |corners: &Vec<[f64; 2]>| {
+        let side = |axis: usize| {
+            let along = || corners.iter().map(|corner| corner[axis]);
+            along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
+        };
+        (corners.len() == 4).then(|| side(0) / side(1))
+    };
+    let ratios: Vec<f64> = outlines_of_robot(&tree).iter().filter_map(sides).collect();
+    // The robot is turned a little, which makes its side wider.
+    let count = |low: f64, high: f64| {
+        let between = ratios.iter().filter(|ratio| (low..high).contains(*ratio));
+        between.count()
+    };
+    let (side, above) = (count(0.595, 0.68), count(0.99, 1.01));
+    assert!(side == 2 && above >= 2, "before and after: {ratios:?}");
+}
+
+/// The links of the base have no shapes and so no track: none of the links that move is the base.
+#[test]
+fn a_base_that_can_not_move_has_no_path() {
+    for robot in ["arm_on_a_bare_base.urdf", "arm_on_a_pedestal.xml"] {
+        let lines = drawn_robot(robot);
+        let tree = roxmltree::Document::parse(&lines).unwrap();
+        let words: Vec<&str> = tree.descendants().filter_map(|node| node.text()).collect();
+        assert!(words.contains(&"path of the hand"), "{robot}: {words:?}");
+        let of_base = words
+            .iter()
+            .any(|word| word.starts_with("path of the base"));
+        assert!(!of_base, "{robot}: {words:?}");
+    }
 }
 
 #[test]

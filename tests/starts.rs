@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::support::{COARSE, actcheck, edit, shipped_project, stderr, stdout};
+use crate::support::{COARSE, actcheck, edit, root, shipped_project, stderr, stdout};
 
 /// A project with the fixed arm, of which a campaign picks a can, in another home posture.
 fn with_home(home: &str) -> tempfile::TempDir {
@@ -57,6 +57,40 @@ fn a_robot_in_the_table_is_an_error_of_the_configuration() {
         !project.path().join("h").exists(),
         "no run was charged to the robot, and no campaign begun"
     );
+}
+
+/// An arm that works along the floor, as it was published: its first link begins in the table.
+#[test]
+fn a_published_arm_in_the_table_is_an_error_with_the_link_and_the_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = root().join("tests/data/robots");
+    std::fs::copy(
+        data.join("arm_along_the_floor.urdf"),
+        folder.path().join("robot.urdf"),
+    )
+    .unwrap();
+    let config = "tests = [[\"Pick\"]]\ntest_count = 3\nseed = 7\n[objectSurface]\nobject_surfaces = [\"mini_coffee_table\"]\n\
+        [pickObject]\nmodel_list = [\"can\"]\n[robot]\nprofile = \"robot.toml\"\n";
+    std::fs::write(folder.path().join("c.toml"), config).unwrap();
+    let (code, proposed) = said(
+        folder.path(),
+        &["new", "robot", "robot.urdf", "--out", "robot.toml"],
+    );
+    assert_eq!(code, 0, "{proposed}");
+    for command in [
+        &["check", "c.toml"][..],
+        &["run", "c.toml", "--history", "h"],
+    ] {
+        let (code, said) = said(folder.path(), command);
+        assert_eq!(code, 2, "{said}");
+        let names_both = said.contains("the robot's `l1` is ")
+            && said.contains(" cm inside `mini_coffee_table_1` at the start");
+        assert!(said.contains("S025") && names_both, "{said}");
+        assert!(
+            !said.contains("not a number") && !said.contains("panic"),
+            "{said}"
+        );
+    }
 }
 
 #[test]

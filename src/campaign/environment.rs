@@ -7,7 +7,7 @@ use crate::budget::runs_per_test;
 use crate::case::check_case;
 use crate::requirement::Requirement;
 use crate::rule_set::recorded_rules;
-use crate::solids;
+use crate::{plausible, solids};
 use actcheck_actions as actions;
 use actcheck_base::{Diagnostic, Diagnostics, Source, program_digest};
 use actcheck_config as config;
@@ -186,6 +186,8 @@ impl Env {
         {
             faults.push(error.diagnostic());
         }
+        let implausible = plausible::implausible(&campaign);
+        campaign.warnings.extend(implausible.clone());
         let space = Space::new(&campaign, &ontology)
             .map_err(|found| faults.extend(found))
             .ok();
@@ -218,7 +220,11 @@ impl Env {
                     programs,
                 })
             }
-            _ => Err(faults),
+            // A length in millimetres is the cause of most that do not fit.
+            _ => {
+                faults.extend(implausible);
+                Err(faults)
+            }
         }
     }
 

@@ -23,6 +23,7 @@ mod line;
 mod make_run;
 pub mod oracles;
 mod outcome;
+mod plausible;
 mod preconditions;
 mod recheck;
 mod replay;

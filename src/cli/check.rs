@@ -85,6 +85,7 @@ pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics
         counted(env.campaign.models.len() as u64, "model"),
         env.campaign.robot.name,
     ));
+    output::print(&env.masses_and_sizes());
     if args.mend {
         output::print_prose(
             "nothing to mend: all moments of inertia of the robot's moving links are possible\n",

@@ -36,6 +36,36 @@ pub struct Trace {
     pub lacks: Vec<String>,
 }
 
+impl Trace {
+    /// Returns the shapes of the robot's links that no joint moves, such as the pedestal of a robot
+    /// without a base, with their poses in a state of the trace. They have no track.
+    pub fn still_links<'a>(
+        &'a self,
+        state: &'a Snapshot,
+    ) -> impl Iterator<Item = (&'a Form, Pose)> + 'a {
+        self.linked_forms(state)
+            .filter(|(form, _)| !self.frames.names.contains(&form.name))
+    }
+
+    /// Returns the shapes of all links of the robot that have one, with their poses in a state of
+    /// the trace.
+    pub fn linked_forms<'a>(
+        &'a self,
+        state: &'a Snapshot,
+    ) -> impl Iterator<Item = (&'a Form, Pose)> + 'a {
+        let poses: BTreeMap<&str, Pose> = state
+            .robot
+            .links
+            .iter()
+            .map(|link| (link.name.as_str(), link.pose))
+            .collect();
+        self.forms.iter().filter_map(move |form| {
+            let link = form.name.strip_prefix("robot/")?;
+            Some((form, *poses.get(link)?))
+        })
+    }
+}
+
 /// The shape of a body, detailed enough for an outline. Mesh pieces are reduced to their outermost
 /// points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -4,11 +4,11 @@
 
 use nalgebra::Isometry3;
 
-use crate::description::{JointKind, RobotModel};
+use crate::description::{Joint, JointKind, RobotModel};
 use crate::kinematics::{holding_efforts, motion};
 
 /// Number of postures in which the weight is measured, besides that with all joints at 0.
-const N_POSTURES: usize = 64;
+pub(super) const N_POSTURES: usize = 64;
 /// Part of a joint's range by which it differs from one posture to the next; that of each further
 /// joint is the part of this one's multiple after the decimal point. It makes any number of
 /// postures even: the golden ratio.
@@ -48,23 +48,7 @@ fn weights(model: &RobotModel) -> Vec<f64> {
     for posture in 0..=N_POSTURES {
         let mut poses = vec![Isometry3::identity()];
         for (idx, joint) in model.joints.iter().enumerate() {
-            let (lower, upper) = match joint.kind {
-                JointKind::Revolute => (
-                    joint.lower.max(-std::f64::consts::PI),
-                    joint.upper.min(std::f64::consts::PI),
-                ),
-                JointKind::Prismatic if joint.upper - joint.lower < f64::INFINITY => {
-                    (joint.lower, joint.upper)
-                }
-                JointKind::Prismatic => (0.0, 0.0),
-            };
-            #[expect(clippy::cast_precision_loss, reason = "Both numbers are small.")]
-            let part = (posture as f64 * ((idx + 1) as f64 * STRIDE).fract()).fract();
-            let position = if posture == 0 {
-                0.0_f64.max(lower).min(upper)
-            } else {
-                lower + part * (upper - lower)
-            };
+            let position = position_in(posture, idx, joint);
             poses.push(poses[joint.parent] * joint.origin * motion(joint, position));
         }
         for (weight, effort) in weights.iter_mut().zip(holding_efforts(model, &poses)) {
@@ -72,6 +56,28 @@ fn weights(model: &RobotModel) -> Vec<f64> {
         }
     }
     weights
+}
+
+/// Position of a joint in one of [`N_POSTURES`] postures that are spread over its range, or in the
+/// posture 0, in which it is at 0 or at the limit nearest to it. Unit: metres or radians.
+pub(super) fn position_in(posture: usize, idx: usize, joint: &Joint) -> f64 {
+    let (lower, upper) = match joint.kind {
+        JointKind::Revolute => (
+            joint.lower.max(-std::f64::consts::PI),
+            joint.upper.min(std::f64::consts::PI),
+        ),
+        JointKind::Prismatic if joint.upper - joint.lower < f64::INFINITY => {
+            (joint.lower, joint.upper)
+        }
+        JointKind::Prismatic => (0.0, 0.0),
+    };
+    #[expect(clippy::cast_precision_loss, reason = "Both numbers are small.")]
+    let part = (posture as f64 * ((idx + 1) as f64 * STRIDE).fract()).fract();
+    if posture == 0 {
+        0.0_f64.max(lower).min(upper)
+    } else {
+        lower + part * (upper - lower)
+    }
 }
 
 #[cfg(test)]

@@ -34,6 +34,7 @@ mod kinematics;
 mod layout;
 mod link_depth;
 mod link_pairs;
+mod measures;
 mod mechanism;
 mod motion;
 mod motor;
@@ -87,6 +88,7 @@ pub use layout::{
     Layout, assumed_efforts, assumed_speeds, balanced_joints, check_robot, grip_limit_n,
     outward_push, shapes_between_fingers,
 };
+pub use measures::{RobotMeasures, robot_measures};
 pub use overlaps::Overlap;
 pub use propose::{Proposal, complete, is_incomplete, propose};
 pub use reach::Shortcuts;

@@ -218,4 +218,11 @@ const CODES_W: &[Code] = &[
         "a damaged or malicious file: entities that grow, hundreds of attributes or namespaces, thousands of levels",
         "don't use the file, or export the model again",
     ),
+    code(
+        "W056",
+        "a mass or a size can't be meant",
+        "a model has less than 1 or more than 25,000 kg/m³, or is larger than 20 m or smaller than 2 mm; a robot lifts 1.5 \
+         times its own mass: masses in grams, lengths in millimetres, a missing mass, or a wrong volume or effort",
+        "correct the number: masses are in kilograms, lengths in metres, efforts in newtons or newton metres",
+    ),
 ];

@@ -20,6 +20,8 @@ use actcheck_history::RunDetail;
 const GRAIN_M: f64 = 1e-4;
 /// Quantisation step of quaternion components, as in traces.
 const GRAIN_TURN: f64 = 2e-4;
+/// Kind and role of the robot's links that never move.
+const ROBOT: &str = "robot";
 
 /// A run with its trace, unless it has none, and the explanations of its failures.
 pub type ReplayedRun = (RunDetail, Option<Trace>, Vec<Explained>);
@@ -141,8 +143,20 @@ impl Replays {
             let (kind, role) = (names::local(&body.category), roles.get(body.id.as_str()));
             Some(json!({ "name": body.id, "form": form(&body.id)?, "at": at, "kind": kind, "role": role }))
         });
+        let still: Vec<Value> = still.collect();
+        let links = trace
+            .snapshots
+            .iter()
+            .take(1)
+            .flat_map(|state| trace.still_links(state));
+        let links = links.map(|(form, pose)| {
+            let at: Vec<f64> = pose.position.into_iter().chain(pose.rotation).collect();
+            let number = self.shapes.of(form);
+            json!({ "name": form.name, "form": number, "at": at, "kind": ROBOT, "role": ROBOT })
+        });
+        let links: Vec<Value> = links.collect();
         Bodies {
-            still: still.collect(),
+            still: still.into_iter().chain(links).collect(),
             tracks,
             slots,
         }

@@ -1,5 +1,7 @@
 //! Vector drawings: a list of shapes and text, independent of the output format.
 
+use crate::picture::font;
+
 /// A rectangle. Unit: pixels, y down.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rect {
@@ -57,6 +59,19 @@ impl Rect {
         let across = self.right().min(other.right()) - self.left.max(other.left);
         let down = self.bottom().min(other.bottom()) - self.top.max(other.top);
         across.max(0.0) * down.max(0.0)
+    }
+
+    /// The part of a rectangle that is in another one; a point or line at its edge if it is outside.
+    pub(super) fn within(&self, other: &Self) -> Self {
+        let inside = |value: f64, low: f64, high: f64| value.max(low).min(high);
+        let left = inside(self.left, other.left, other.right());
+        let top = inside(self.top, other.top, other.bottom());
+        Self {
+            left,
+            top,
+            width: inside(self.right(), other.left, other.right()) - left,
+            height: inside(self.bottom(), other.top, other.bottom()) - top,
+        }
     }
 
     pub(super) fn holds(&self, other: &Self) -> bool {
@@ -179,6 +194,8 @@ pub struct Drawing {
 /// Coordinates are limited to this distance, because unstable simulations can place bodies
 /// anywhere. Unit: pixels.
 const FAR_PX: f64 = 20_000.0;
+/// Least distance of a text from the right edge. Unit: pixels.
+const EDGE_PX: f64 = 2.0;
 
 impl Drawing {
     pub(super) fn new(width: f64) -> Self {
@@ -234,9 +251,19 @@ impl Drawing {
         }
     }
 
+    /// Writes a line of text; the end of one that would run out of the picture becomes an ellipsis.
     pub(super) fn words(&mut self, words: Words) {
-        if words.at.iter().all(|value| value.abs() < FAR_PX) {
-            self.marks.push((self.clip, Mark::Words(words)));
+        if words.at.iter().any(|value| value.abs() >= FAR_PX) {
+            return;
+        }
+        let end = self
+            .clip
+            .map_or(self.width, |clip| clip.right().min(self.width));
+        let room = end - EDGE_PX - words.at[0];
+        let text = font::shortened(&words.text, words.size, words.bold, room);
+        if !text.is_empty() {
+            self.marks
+                .push((self.clip, Mark::Words(Words { text, ..words })));
         }
     }
 }

@@ -66,6 +66,22 @@ pub(super) fn outline(text: &str, at: [f64; 2], size: f64, bold: bool) -> Option
     pen.path.finish()
 }
 
+/// Returns a text whose end is replaced by an ellipsis if it is wider than `most`; an empty one if
+/// that leaves nothing.
+pub(super) fn shortened(text: &str, size: f64, bold: bool, most: f64) -> String {
+    if width(text, size, bold) <= most {
+        return text.to_owned();
+    }
+    let mut kept = text.to_owned();
+    while kept.pop().is_some() {
+        let cut = format!("{}…", kept.trim_end());
+        if width(&cut, size, bold) <= most {
+            return if kept.is_empty() { String::new() } else { cut };
+        }
+    }
+    String::new()
+}
+
 /// Splits a text into lines of at most the width `most`, between words if possible.
 pub(super) fn wrapped(text: &str, size: f64, bold: bool, most: f64) -> Vec<String> {
     let mut lines = vec![String::new()];
@@ -160,6 +176,17 @@ mod tests {
             width("\u{4e00}", 12.0, false),
             width("\u{fffd}", 12.0, false)
         );
+    }
+
+    #[test]
+    fn text_is_shortened_to_its_room() {
+        let text = "a_thing_with_a_long_name_1";
+        assert_eq!(shortened(text, 12.0, true, 1e3), text);
+        for most in [0.0, 8.0, 20.0, 60.0, 150.0] {
+            let short = shortened(text, 12.0, true, most);
+            assert!(width(&short, 12.0, true) <= most, "{short}");
+            assert!(short.is_empty() || short.ends_with('…'), "{short}");
+        }
     }
 
     #[test]

@@ -18,8 +18,9 @@ const MOST_LINES: usize = 2;
 const LINE_PX: f64 = 17.0;
 /// Space reserved for the ellipsis of truncated text. Unit: pixels.
 const ELLIPSIS_PX: f64 = 20.0;
-/// Font size. Unit: pixels.
+/// Font sizes. Unit: pixels.
 const SIZE_PX: f64 = 12.0;
+const TITLE_PX: f64 = 17.0;
 
 /// Text above the panels.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -155,17 +156,19 @@ struct Writer<'a> {
 
 impl Writer<'_> {
     fn title(&mut self, text: &str) {
-        self.y += 18.0;
-        let at = [self.left, self.y];
-        let paint = Paint::solid(paint::INK);
-        self.drawing.words(Words {
-            text: text.to_owned(),
-            at,
-            size: 17.0,
-            bold: true,
-            paint,
-            rim: false,
-        });
+        for text in font::wrapped(text, TITLE_PX, true, self.width) {
+            self.y += TITLE_PX + 1.0;
+            let at = [self.left, self.y];
+            let paint = Paint::solid(paint::INK);
+            self.drawing.words(Words {
+                text,
+                at,
+                size: TITLE_PX,
+                bold: true,
+                paint,
+                rim: false,
+            });
+        }
         self.y += 6.0;
     }
 

@@ -1,4 +1,4 @@
-//! Label placement: close to the labelled object, without overlaps between labels.
+//! Label placement: beside the labelled object, without overlaps between labels.
 
 use crate::picture::drawing::{Drawing, Line, Paint, Rect, Words};
 use crate::picture::font;
@@ -6,6 +6,17 @@ use crate::picture::paint;
 
 /// Margin around a label. Unit: pixels.
 const GAP_PX: f64 = 2.0;
+/// Cost of a label that covers the thing that it names: more than that of the farthest place beside
+/// it. Only a thing around which the panel has no room, such as a table that fills it, is covered.
+const COVERS: f64 = 1e3;
+/// Cost of a label that hides other objects with all of its area. Unit: pixels.
+const HIDES_PX: f64 = 40.0;
+/// Cost of a label that lies on lines or on the robot with all of its area. Unit: pixels.
+const BUSY_PX: f64 = 25.0;
+/// Largest width of a label, as a share of the panel's: others would lie across everything.
+const WIDEST: f64 = 0.45;
+/// Steps between the places of a label on its object, in each direction.
+const ON_IT: u32 = 8;
 /// Labels farther than this from their object get a leader line. Unit: pixels.
 const LEADER_PX: f64 = 7.0;
 
@@ -15,6 +26,8 @@ pub(super) struct Labels {
     taken: Vec<Rect>,
     /// Objects that labels should not hide.
     things: Vec<Rect>,
+    /// Lines and shapes on which labels are hard to read.
+    busy: Vec<Rect>,
 }
 
 /// A label to place.
@@ -33,7 +46,13 @@ impl Labels {
             panel: panel.grown(-3.0),
             taken: Vec::new(),
             things,
+            busy: Vec::new(),
         }
+    }
+
+    /// Lets labels rather be beside some rectangles.
+    pub(super) fn spare(&mut self, busy: impl IntoIterator<Item = Rect>) {
+        self.busy.extend(busy);
     }
 
     /// Keeps labels out of a rectangle.
@@ -48,27 +67,28 @@ impl Labels {
         if self.panel.shared(&label.at.grown(1.0)) == 0.0 {
             return;
         }
-        let width = font::width(label.text, label.size, label.bold);
+        let most = self.panel.width * WIDEST;
+        let text = font::shortened(label.text, label.size, label.bold, most);
+        let width = font::width(&text, label.size, label.bold);
         let height = label.size * 1.15;
-        let places = candidates(&label.at, width, height)
-            .into_iter()
-            .filter(|place| {
-                self.panel.holds(place)
-                    && self
-                        .taken
-                        .iter()
-                        .all(|other| other.shared(&place.grown(GAP_PX)) == 0.0)
-            });
-        let rated = places.map(|place| (self.cost(&place, &label.at), place));
+        let at = label.at.within(&self.panel);
+        let places = candidates(&at, width, height).into_iter().filter(|place| {
+            self.panel.holds(place)
+                && self
+                    .taken
+                    .iter()
+                    .all(|other| other.shared(&place.grown(GAP_PX)) == 0.0)
+        });
+        let rated = places.map(|place| (self.cost(&place, &at), place));
         let Some((_, place)) = rated.min_by(|a, b| a.0.total_cmp(&b.0)) else {
             return;
         };
         self.taken.push(place);
-        leader(drawing, &label.at, &place);
+        leader(drawing, &at, &place);
         let at = [place.left, place.top + label.size * 0.92];
         let (size, bold) = (label.size, label.bold);
         drawing.words(Words {
-            text: label.text.to_owned(),
+            text,
             at,
             size,
             bold,
@@ -77,12 +97,17 @@ impl Labels {
         });
     }
 
-    /// Cost of a position: the distance from the object, and the hidden area of objects relative to
-    /// the label's area.
+    /// Cost of a position: the distance from the object, the hidden area of objects relative to the
+    /// label's area, and whether it covers the named object.
     fn cost(&self, place: &Rect, at: &Rect) -> f64 {
         let hidden: f64 = self.things.iter().map(|thing| thing.shared(place)).sum();
         let area = place.width * place.height;
-        gap(place, at) + 40.0 * (hidden / area).min(2.0)
+        let covers = if at.shared(place) > 0.0 { COVERS } else { 0.0 };
+        let crossed: f64 = self.busy.iter().map(|busy| busy.shared(place)).sum();
+        gap(place, at)
+            + HIDES_PX * (hidden / area).min(2.0)
+            + BUSY_PX * (crossed / area).min(1.0)
+            + covers
     }
 }
 
@@ -93,7 +118,8 @@ fn gap(a: &Rect, b: &Rect) -> f64 {
     across.hypot(down)
 }
 
-/// Candidate positions for a label: on its object, and around it at increasing distances.
+/// Candidate positions for a label: on the visible part of its object, and around it at increasing
+/// distances.
 fn candidates(at: &Rect, width: f64, height: f64) -> Vec<Rect> {
     let [x, y] = at.middle();
     let centred = |x: f64, y: f64| Rect {
@@ -103,6 +129,15 @@ fn candidates(at: &Rect, width: f64, height: f64) -> Vec<Rect> {
         height,
     };
     let mut places = vec![centred(x, y)];
+    let steps = |extent: f64, length: f64| {
+        (0..=ON_IT).map(move |step| {
+            let room = (extent - length).max(0.0);
+            room * (f64::from(step) / f64::from(ON_IT) - 0.5)
+        })
+    };
+    for across in steps(at.width, width) {
+        places.extend(steps(at.height, height).map(|down| centred(x + across, y + down)));
+    }
     for ring in 0..14 {
         let away = 4.0 + 13.0 * f64::from(ring);
         let (half_width, half_height) = (
@@ -139,4 +174,85 @@ fn leader(drawing: &mut Drawing, at: &Rect, place: &Rect) {
         vec![from, nearest(at, from)],
         Line::new(Paint::new(paint::INK, 0.55), 0.7),
     );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::picture::drawing::Mark;
+
+    const PANEL: Rect = Rect {
+        left: 20.0,
+        top: 40.0,
+        width: 500.0,
+        height: 300.0,
+    };
+
+    /// Labels of things at all places of a panel, with the rectangles of their texts.
+    fn placed(text: &str, at: Rect, things: Vec<Rect>) -> Vec<Rect> {
+        let mut drawing = Drawing::new(560.0);
+        let label = Label {
+            text,
+            size: 11.0,
+            bold: true,
+            rgb: paint::INK,
+            at,
+        };
+        Labels::new(PANEL, things).write(&mut drawing, &label);
+        let texts = drawing.marks.iter().filter_map(|(_, mark)| match mark {
+            Mark::Words(words) => Some(words),
+            Mark::Shape { .. } => None,
+        });
+        let rect = |words: &Words| Rect {
+            left: words.at[0],
+            top: words.at[1] - words.size * 0.92,
+            width: font::width(&words.text, words.size, words.bold),
+            height: words.size * 1.15,
+        };
+        texts.map(rect).collect()
+    }
+
+    #[test]
+    fn labels_are_beside_their_things_and_in_the_panel() {
+        let names = [
+            "can",
+            "glass_with_handle_1",
+            "a_thing_whose_name_is_far_wider_than_half_of_its_panel_would_be_1",
+        ];
+        for (name, size) in names.into_iter().flat_map(|name| {
+            [2.0, 14.0, 60.0, 180.0]
+                .into_iter()
+                .map(move |size| (name, size))
+        }) {
+            for step in 0..60 {
+                let share = |stride: f64| 0.05 + 0.9 * (f64::from(step) * stride).fract();
+                let at = Rect {
+                    left: PANEL.left + share(0.618) * PANEL.width - size / 2.0,
+                    top: PANEL.top + share(0.755) * PANEL.height - size / 2.0,
+                    width: size,
+                    height: size,
+                };
+                let texts = placed(name, at, vec![at]);
+                let [text] = texts.as_slice() else {
+                    panic!("{name} of {size} pixels in step {step} has no label")
+                };
+                assert!(PANEL.holds(text), "{name}: {text:?}");
+                assert_eq!(text.shared(&at), 0.0, "{name} at {at:?}: {text:?}");
+            }
+        }
+    }
+
+    /// There is no room beside a table that fills the panel.
+    #[test]
+    fn a_thing_that_fills_its_panel_is_labelled_on_it() {
+        let glass = Rect {
+            left: 200.0,
+            top: 150.0,
+            width: 80.0,
+            height: 80.0,
+        };
+        let texts = placed("table_1", PANEL.grown(30.0), vec![glass]);
+        assert!(texts.len() == 1 && PANEL.holds(&texts[0]), "{texts:?}");
+        assert_eq!(texts[0].shared(&glass), 0.0);
+    }
 }

@@ -106,11 +106,15 @@ fn entries(data: &PanelData<'_>) -> Vec<(Sample, &'static str)> {
             Sample::Path(Mover::Base),
             "path of the base, in the colour of its action",
         ),
-        (moved(Mover::Hand), Sample::Path(Mover::Hand), "of the hand"),
+        (
+            moved(Mover::Hand),
+            Sample::Path(Mover::Hand),
+            "path of the hand",
+        ),
         (
             moved(Mover::Target),
             Sample::Path(Mover::Target),
-            "of the target",
+            "path of the target",
         ),
         (pressed, Sample::Star, "hardest unwanted contact"),
     ];

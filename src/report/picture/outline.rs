@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Isometry3, Point3};
 
-use crate::picture::window::Window;
+use crate::picture::window::{Bounds, Window};
 use actcheck_data::{Part, Shape, convex_hull};
 
 /// Number of corners that approximate a circle.
@@ -27,8 +27,19 @@ pub(super) fn silhouette(
     seen.filter(|polygon| polygon.len() > 2).collect()
 }
 
+/// The box around some shapes at a pose; `None` if there are none. Frame: world.
+pub(super) fn bounds_of(parts: &[Part], pose: &Isometry3<f64>) -> Option<Bounds> {
+    let points = parts.iter().flat_map(|part| {
+        let placed = pose * part.pose.to_isometry();
+        corners(&part.shape)
+            .into_iter()
+            .map(move |corner| Bounds::point((placed * corner).coords.into()))
+    });
+    Bounds::union(points)
+}
+
 /// Points whose convex hull is the shape, within a few percent. Frame: shape.
-pub(super) fn corners(shape: &Shape) -> Vec<Point3<f64>> {
+fn corners(shape: &Shape) -> Vec<Point3<f64>> {
     match shape {
         Shape::Box { size } => {
             let [x, y, z] = size.map(|extent| extent / 2.0);

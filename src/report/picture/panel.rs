@@ -4,17 +4,20 @@ use std::collections::BTreeMap;
 
 use crate::picture::drawing::{Drawing, Line, Paint, Rect, Style, Words};
 use crate::picture::labels::{Label, Labels};
-use crate::picture::outline::silhouette;
-use crate::picture::paths::{Mover, Path, pose_at};
+use crate::picture::outline::{bounds_of, silhouette};
+use crate::picture::paths::{Mover, Path};
 use crate::picture::window::{Bounds, Window};
 use crate::picture::{font, paint};
 use crate::pressed::Pressed;
 use actcheck_base::names;
 use actcheck_data::{BodyState, Form, Part, Role, Shape, Snapshot, Trace};
 
-/// Upper bound of a link's extent from its origin. Links farther than this outside of the window
+/// Links farther than this outside of the window, such as those behind the things of a side view,
 /// are omitted. Unit: metres.
-const LINK_REACH_M: f64 = 0.8;
+const BESIDE_M: f64 = 0.6;
+
+/// Room around a path in which a label would touch it. Unit: pixels.
+const LINE_PX: f64 = 3.0;
 
 /// Radius of the star at the hardest contact. Unit: pixels.
 const STAR_PX: f64 = 11.0;
@@ -86,13 +89,13 @@ pub(super) fn draw(
             paint::movable(data.role(body)),
         );
     }
-    robot(drawing, data, moment, window);
+    let mut labels = Labels::new(window.panel, things(&shown, window));
+    labels.spare(robot(drawing, data.trace, snapshot, window));
     heading(drawing, snapshot.robot.base_true, window);
     match moment {
         Moment::Before => percepts(drawing, data.trace, window),
-        Moment::After => paths(drawing, data.paths, window),
+        Moment::After => labels.spare(paths(drawing, data.paths, window)),
     }
-    let mut labels = Labels::new(window.panel, things(&shown, window));
     ruler(drawing, window, &mut labels);
     if moment == Moment::After {
         press(drawing, data, window, &mut labels);
@@ -127,29 +130,36 @@ fn form(data: &PanelData<'_>, body: &BodyState, window: &Window) -> Vec<Vec<[f64
     }
 }
 
-/// Draws the robot's links as in the first or last frame.
-fn robot(drawing: &mut Drawing, data: &PanelData<'_>, moment: Moment, window: &Window) {
-    let frames = &data.trace.frames;
-    let row = if moment == Moment::Before {
-        0
-    } else {
-        frames.rows.len().saturating_sub(1)
-    };
-    // Objects have tracks too.
-    let links = frames
-        .names
-        .iter()
-        .enumerate()
-        .filter(|(_, name)| name.starts_with("robot/"));
-    let links = links.filter_map(|(slot, name)| {
-        let form = data.forms.get(name.as_str())?;
-        let pose = pose_at(data.trace, row, slot)?;
-        let around = Bounds::point(pose.translation.vector.into()).grown(LINK_REACH_M);
+/// Draws all links of the robot, also those that are fixed to a fixed base.
+/// Returns the rectangles around them.
+fn robot(drawing: &mut Drawing, trace: &Trace, snapshot: &Snapshot, window: &Window) -> Vec<Rect> {
+    let links = trace.linked_forms(snapshot).filter_map(|(form, pose)| {
+        let pose = pose.to_isometry();
+        let origin = Bounds::point(pose.translation.vector.into());
+        let around = bounds_of(&form.parts, &pose).map_or(origin, |shapes| shapes.with(origin));
         window
-            .overlaps(&around)
+            .overlaps(&around.grown(BESIDE_M))
             .then(|| silhouette(&form.parts, &pose, window))
     });
-    drawing.shape(links.flatten().collect(), true, paint::ROBOT);
+    let outlines: Vec<Vec<[f64; 2]>> = links.flatten().collect();
+    let around = outlines
+        .iter()
+        .filter_map(|line| rect_around(line))
+        .collect();
+    drawing.shape(outlines, true, paint::ROBOT);
+    around
+}
+
+/// The rectangle around some points; `None` if there are none.
+fn rect_around(points: &[[f64; 2]]) -> Option<Rect> {
+    let (first, rest) = points.split_first()?;
+    let start = Rect {
+        left: first[0],
+        top: first[1],
+        width: 0.0,
+        height: 0.0,
+    };
+    Some(rest.iter().fold(start, |rect, point| rect.with(*point)))
 }
 
 /// Draws an arrow at the robot's base, in views from above.
@@ -308,7 +318,9 @@ fn name_percepts(drawing: &mut Drawing, trace: &Trace, window: &Window, labels: 
     }
 }
 
-fn paths(drawing: &mut Drawing, paths: &[Path], window: &Window) {
+/// Draws paths, and returns the rectangles around their pieces.
+fn paths(drawing: &mut Drawing, paths: &[Path], window: &Window) -> Vec<Rect> {
+    let mut around = Vec::new();
     // In side views, the path of the base is only a line on the floor.
     for path in paths
         .iter()
@@ -323,8 +335,11 @@ fn paths(drawing: &mut Drawing, paths: &[Path], window: &Window) {
         if let (Some(start), Mover::Hand | Mover::Base) = (points.first(), path.mover) {
             drawing.circle(*start, 2.6, Style::fill(Paint::solid(rgb)));
         }
+        let pieces = points.windows(2).filter_map(rect_around);
+        around.extend(pieces.map(|piece| piece.grown(LINE_PX)));
         drawing.line(points, paint::path(path.mover, rgb));
     }
+    around
 }
 
 /// Rectangles of movable objects, which labels should avoid.

@@ -1,8 +1,6 @@
 //! Paths of base, hand and target during a run, one for each action.
 
-use nalgebra::{Isometry3, Point3};
-
-use actcheck_data::{Pose, Snapshot, Trace};
+use actcheck_data::{Samples, Trace};
 
 /// The body that moves along a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,42 +20,40 @@ pub(super) struct Path {
     pub(super) points: Vec<[f64; 3]>,
 }
 
-/// Minimum length of a path. Unit: metres.
+/// A path that leads nowhere farther than this from its start is not drawn. Unit: metres.
 const SHORTEST_M: f64 = 0.01;
-/// Drift below this is not measurable, because frames are rounded and the last one is up to 0.1 s
-/// old. Unit: metres.
-const MEASURABLE_M: f64 = 0.003;
+/// Time between two points of a path. Unit: seconds. Samples are far denser than pixels.
+const POINT_SECS: f64 = 0.1;
+/// The recorded quantities of a position.
+const POSITION: [&str; 3] = ["x", "y", "z"];
+/// Those of the base, which is on the floor.
+const BASE: [&str; 2] = ["baseX", "baseY"];
 
-/// All paths that are long enough to draw.
+/// All paths that are long enough to draw. They are those that were recorded: a base that can't
+/// move has none.
 pub(super) fn paths(trace: &Trace, target: Option<&str>) -> Vec<Path> {
+    let has_hand = !trace.lacks.iter().any(|lack| lack == "gripper");
     let followed = [
-        (Mover::Base, base(trace)),
-        (Mover::Hand, hand(trace)),
-        (
-            Mover::Target,
-            target.and_then(|id| Some((slot(trace, id)?, Isometry3::identity()))),
-        ),
+        (Mover::Base, Some("robot"), &BASE[..]),
+        (Mover::Hand, has_hand.then_some("gripper"), &POSITION[..]),
+        (Mover::Target, target, &POSITION[..]),
     ];
-    let spans = spans(trace);
     let mut paths = Vec::new();
-    for (mover, (track, offset)) in followed
-        .into_iter()
-        .filter_map(|(mover, found)| Some((mover, found?)))
-    {
-        let points: Vec<[f64; 3]> = (0..trace.frames.rows.len())
-            .filter_map(|row| pose_at(trace, row, track))
-            .map(|pose| (pose * offset * Point3::origin()).coords.into())
-            .collect();
-        for (action, (first, last)) in spans.iter().enumerate() {
-            let Some(points) = points.get(*first..=(*last).min(points.len().saturating_sub(1)))
-            else {
+    for (mover, thing, quantities) in followed {
+        let Some(thing) = thing else {
+            continue;
+        };
+        let recorded = trace.actions.iter().zip(&trace.robot_courses);
+        for (action, (recorded, course)) in recorded.enumerate() {
+            if mover == Mover::Base && recorded.base.is_none() {
                 continue;
-            };
-            if length(points) > SHORTEST_M {
+            }
+            let points = points(&course.samples, thing, quantities);
+            if reach(&points) > SHORTEST_M {
                 paths.push(Path {
                     mover,
                     action,
-                    points: points.to_vec(),
+                    points,
                 });
             }
         }
@@ -65,94 +61,119 @@ pub(super) fn paths(trace: &Trace, target: Option<&str>) -> Vec<Path> {
     paths
 }
 
-/// First and last frame of each action. The last frame of an action is the first of the next.
-fn spans(trace: &Trace) -> Vec<(usize, usize)> {
-    let mut first = 0;
-    let mut spans = Vec::new();
-    for pair in trace.snapshots.windows(2) {
-        let frames = (pair[1].time_secs - pair[0].time_secs) / trace.frames.period_secs + 1e-6;
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "frames of one run"
-        )]
-        let last = first + frames.clamp(0.0, 1e9) as usize;
-        spans.push((first, last));
-        first = last;
+/// The recorded positions of a thing; coordinates without a quantity are 0. Empty if one was not
+/// recorded.
+fn points(samples: &Samples, thing: &str, quantities: &[&str]) -> Vec<[f64; 3]> {
+    let mut points = vec![[0.0; 3]; samples.count];
+    for (axis, quantity) in quantities.iter().enumerate() {
+        let of_thing = samples.series.iter().find(|series| {
+            series.thing == thing && series.other.is_empty() && series.quantity == *quantity
+        });
+        let Some(series) = of_thing else {
+            return Vec::new();
+        };
+        for (point, value) in points.iter_mut().zip(series.values()) {
+            point[axis] = value;
+        }
     }
-    spans
-}
-
-/// Pose of a track in a frame. Returns `None` if it is missing or not finite.
-pub(super) fn pose_at(trace: &Trace, row: usize, slot: usize) -> Option<Isometry3<f64>> {
-    let values = trace.frames.rows.get(row)?.get(7 * slot..7 * slot + 7)?;
-    let value = |idx: usize| f64::from(values[idx]);
-    let pose = Pose {
-        position: [value(0), value(1), value(2)],
-        rotation: [value(3), value(4), value(5), value(6)],
-    };
-    let finite = values.iter().all(|value| value.is_finite());
-    finite.then(|| pose.to_isometry())
-}
-
-fn slot(trace: &Trace, name: &str) -> Option<usize> {
-    trace.frames.names.iter().position(|track| track == name)
-}
-
-/// The link that carries the grasp frame, and the frame's pose relative to it.
-fn hand(trace: &Trace) -> Option<(usize, Isometry3<f64>)> {
-    carrier(trace, |snapshot| snapshot.robot.gripper.to_isometry())
-}
-
-/// The link that carries the base frame, and the frame's pose relative to it.
-fn base(trace: &Trace) -> Option<(usize, Isometry3<f64>)> {
-    let base = |snapshot: &Snapshot| {
-        let [x, y, heading] = snapshot.robot.base_true;
-        Pose::upright([x, y, 0.0], heading).to_isometry()
-    };
-    carrier(trace, base)
-}
-
-/// The link to which a frame is fixed: the frame's relative pose is the same at the start and at
-/// the end. If there are several, the nearest.
-fn carrier(
-    trace: &Trace,
-    frame: impl Fn(&Snapshot) -> Isometry3<f64>,
-) -> Option<(usize, Isometry3<f64>)> {
-    let (first, last) = (
-        frame(trace.snapshots.first()?),
-        frame(trace.snapshots.last()?),
-    );
-    let links = trace
-        .frames
-        .names
-        .iter()
-        .enumerate()
-        .filter(|(_, name)| name.starts_with("robot/"));
-    let n_rows = trace.frames.rows.len();
-    let offsets = links.filter_map(|(slot, _)| {
-        let began = pose_at(trace, 0, slot)?.inverse() * first;
-        let ended = pose_at(trace, n_rows.checked_sub(1)?, slot)?.inverse() * last;
-        let drift = (began.translation.vector - ended.translation.vector).norm();
-        Some((
-            drift.max(MEASURABLE_M) * 100.0 + began.translation.vector.norm(),
-            slot,
-            began,
-        ))
-    });
-    offsets
-        .min_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, slot, offset)| (slot, offset))
-}
-
-fn length(points: &[[f64; 3]]) -> f64 {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "limited to a small number"
+    )]
+    let every = (POINT_SECS / samples.period_secs.max(1e-4))
+        .round()
+        .clamp(1.0, 1e3) as usize;
+    let last = points.len().saturating_sub(1);
     points
-        .windows(2)
-        .map(|pair| {
-            (0..3)
-                .map(|axis| (pair[1][axis] - pair[0][axis]).powi(2))
-                .sum::<f64>()
-                .sqrt()
-        })
-        .sum()
+        .into_iter()
+        .enumerate()
+        .filter(|(idx, _)| idx % every == 0 || *idx == last)
+        .map(|(_, point)| point)
+        .collect()
+}
+
+/// Largest distance of a point from the first. Unit: metres.
+fn reach(points: &[[f64; 3]]) -> f64 {
+    let Some(first) = points.first() else {
+        return 0.0;
+    };
+    let from_first = |point: &[f64; 3]| {
+        (0..3)
+            .map(|axis| (point[axis] - first[axis]).powi(2))
+            .sum::<f64>()
+            .sqrt()
+    };
+    points.iter().map(from_first).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use actcheck_data::{ActionTrace, RobotCourse, Series};
+    use std::collections::BTreeMap;
+
+    /// A second at 100 Hz in which base and hand move by `way_m` along x.
+    fn trace(base: Option<[[f64; 2]; 2]>, way_m: f64) -> Trace {
+        let mut samples = Samples {
+            period_secs: 0.01,
+            count: 101,
+            series: Vec::new(),
+        };
+        let of_hand = POSITION.map(|quantity| ("gripper", quantity));
+        for (thing, quantity) in BASE.map(|of| ("robot", of)).into_iter().chain(of_hand) {
+            let mut series = Series::recorded(thing, "", quantity);
+            let speed = if matches!(quantity, "x" | "baseX") {
+                way_m
+            } else {
+                0.0
+            };
+            (0..101).for_each(|tick| series.push(1.0 + speed * f64::from(tick) / 100.0));
+            samples.series.push(series);
+        }
+        let action = ActionTrace {
+            base,
+            ..ActionTrace::not_reached("Pick", &BTreeMap::new())
+        };
+        Trace {
+            actions: vec![action],
+            robot_courses: vec![RobotCourse {
+                samples,
+                ..RobotCourse::default()
+            }],
+            ..Trace::default()
+        }
+    }
+
+    #[test]
+    fn paths_are_those_that_were_recorded() {
+        let movers = |trace: &Trace| -> Vec<(Mover, usize, [f64; 3])> {
+            let all = paths(trace, Some("can_1")).into_iter();
+            all.map(|path| {
+                (
+                    path.mover,
+                    path.points.len(),
+                    path.points[path.points.len() - 1],
+                )
+            })
+            .collect()
+        };
+        let moves = Some([[1.0, 1.0], [1.5, 1.0]]);
+        assert_eq!(
+            movers(&trace(moves, 0.5)),
+            [
+                (Mover::Base, 11, [1.5, 1.0, 0.0]),
+                (Mover::Hand, 11, [1.5, 1.0, 1.0])
+            ]
+        );
+        assert_eq!(movers(&trace(moves, 0.005)), []);
+        // A base that can't move has no path, wherever its links are.
+        let fixed = trace(None, 0.5);
+        assert_eq!(movers(&fixed), [(Mover::Hand, 11, [1.5, 1.0, 1.0])]);
+        let handless = Trace {
+            lacks: vec!["gripper".to_owned()],
+            ..fixed
+        };
+        assert_eq!(movers(&handless), []);
+    }
 }

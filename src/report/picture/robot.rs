@@ -4,10 +4,10 @@ use nalgebra::{Isometry3, Point3};
 
 use crate::picture::drawing::{Drawing, Line, Paint, Rect, Words};
 use crate::picture::labels::{Label, Labels};
-use crate::picture::outline::{corners, silhouette};
-use crate::picture::paint;
+use crate::picture::outline::{bounds_of, silhouette};
 use crate::picture::panel::ruler;
 use crate::picture::window::{Bounds, View, Window};
+use crate::picture::{font, paint};
 use actcheck_data::RobotView;
 
 /// Width of a panel and largest height. Unit: pixels.
@@ -33,30 +33,22 @@ const AXES: [u32; 3] = [0xd5_5e00, 0x00_8a66, 0x00_72b2];
 
 /// Draws a robot in each of its postures. Returns `None` if it has no shapes.
 pub fn robot_picture(name: &str, postures: &[RobotView]) -> Option<Drawing> {
-    let points = postures
+    let shapes = postures
         .iter()
-        .flat_map(|view| &view.solids)
-        .flat_map(|solid| {
-            let pose = solid.pose.to_isometry();
-            corners(&solid.shape)
-                .into_iter()
-                .map(move |corner| Bounds::point((pose * corner).coords.into()))
-        });
-    let bounds = Bounds::union(points)?.grown(AROUND_M);
+        .filter_map(|view| bounds_of(&view.solids, &Isometry3::identity()));
+    let bounds = Bounds::union(shapes)?.grown(AROUND_M);
     let widest = bounds.extent(0).max(bounds.extent(1)).max(0.1);
     let scale = (PANEL_PX[0] / widest).min(PANEL_PX[1] / bounds.extent(2).max(0.1));
     let height = bounds.extent(2) * scale;
     let columns = postures.len().min(PER_ROW) * VIEWS.len();
     let mut drawing = Drawing::new(GAP_PX + columns as f64 * (PANEL_PX[0] + GAP_PX));
     let title = format!("{name}: axes x orange, y green, z blue");
-    write(
-        &mut drawing,
-        &title,
-        [GAP_PX, GAP_PX + TITLE_PX],
-        TITLE_PX,
-        true,
-    );
-    let top = GAP_PX * 2.0 + TITLE_PX;
+    let mut top = GAP_PX;
+    for line in font::wrapped(&title, TITLE_PX, true, drawing.width - 2.0 * GAP_PX) {
+        top += TITLE_PX;
+        write(&mut drawing, &line, [GAP_PX, top], TITLE_PX, true);
+    }
+    top += GAP_PX;
     let row_px = height + GAP_PX * 2.0 + SIZE_PX;
     for (idx, posture) in postures.iter().enumerate() {
         for (side, (view, from)) in VIEWS.into_iter().enumerate() {

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::picture::Caption;
 use crate::picture::drawing::{Drawing, Paint, Rect, Words};
+use crate::picture::outline::bounds_of;
 use crate::picture::panel::{Moment, PanelData};
 use crate::picture::paths::{Mover, paths};
 use crate::picture::window::{Bounds, View, Window, close_ups, overview};
@@ -62,6 +63,7 @@ pub fn run_picture(caption: &Caption, trace: &Trace) -> Option<Drawing> {
         trace,
         &subjects,
         data.pressed.as_ref().map(|pressed| pressed.point_m),
+        mount(trace),
     )?;
     let base_path: Vec<[f64; 3]> = paths
         .iter()
@@ -97,6 +99,12 @@ pub fn run_picture(caption: &Caption, trace: &Trace) -> Option<Drawing> {
     y = charts::draw(&mut drawing, &caption.charts, below, GAP_PX);
     drawing.height = legend::draw(&mut drawing, &data, GAP_PX, y, inner) + GAP_PX / 2.0;
     Some(drawing)
+}
+
+/// The box around the links of the robot that no joint moves, such as its pedestal.
+fn mount(trace: &Trace) -> Option<Bounds> {
+    let links = trace.still_links(trace.snapshots.first()?);
+    Bounds::union(links.filter_map(|(form, pose)| bounds_of(&form.parts, &pose.to_isometry())))
 }
 
 /// Horizontal axis of the side view: the axis along which the robot approaches, so that hand and

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::picture::drawing::{Drawing, Line, Mark, Paint, Rect, Style, Words};
+use crate::picture::font;
 use crate::xml;
 
 impl Drawing {
@@ -95,6 +96,8 @@ fn paints(what: &str, Paint { rgb, opacity }: Paint) -> String {
 
 fn text(out: &mut String, words: &Words) {
     let [x, y] = words.at;
+    // A viewer without our font needs more or less room for the same letters.
+    let width = font::width(&words.text, words.size, words.bold);
     let weight = if words.bold {
         " font-weight=\"bold\""
     } else {
@@ -107,7 +110,8 @@ fn text(out: &mut String, words: &Words) {
     };
     let _ = writeln!(
         out,
-        "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{}\"{weight}{}{rim}>{}</text>",
+        "<text x=\"{x:.1}\" y=\"{y:.1}\" font-size=\"{}\" textLength=\"{width:.1}\" \
+         lengthAdjust=\"spacingAndGlyphs\"{weight}{}{rim}>{}</text>",
         words.size,
         paints("fill", words.paint),
         xml::text(&words.text)

@@ -160,13 +160,15 @@ const AROUND_M: f64 = 0.12;
 const LARGEST_CLOSE_UP_M: f64 = 2.8;
 
 /// Regions of the close-ups before and after: the same region if it is small enough. Returns `None`
-/// if the trace has no states. The region after includes `point`, if it is near enough.
+/// if the trace has no states. The region after includes `point`, and both include `mount`, if
+/// these are near enough.
 pub(super) fn close_ups(
     trace: &Trace,
     subjects: &BTreeSet<&str>,
     point: Option<[f64; 3]>,
+    mount: Option<Bounds>,
 ) -> Option<[Bounds; 2]> {
-    let before = region_of_interest(trace.snapshots.first()?, subjects, trace);
+    let mut before = region_of_interest(trace.snapshots.first()?, subjects, trace);
     let mut after = region_of_interest(trace.snapshots.last()?, subjects, trace);
     let is_small = |bounds: &Bounds| {
         [0, 1]
@@ -176,6 +178,12 @@ pub(super) fn close_ups(
     let wider = point.map(|point| after.with(Bounds::point(point).grown(AROUND_M)));
     if let Some(wider) = wider.filter(is_small) {
         after = wider;
+    }
+    if let Some(mount) = mount {
+        let wider = [before.with(mount), after.with(mount)];
+        if wider.iter().all(is_small) {
+            [before, after] = wider;
+        }
     }
     let both = before.with(after);
     let [mut before, mut after] = if is_small(&both) {

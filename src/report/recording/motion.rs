@@ -56,6 +56,16 @@ pub(super) fn record(
         all.push(&pose);
         recording.log_static(path(&body.id), &all)?;
     }
+    let first = trace.snapshots.iter().take(1);
+    for (form, pose) in first.flat_map(|state| trace.still_links(state)) {
+        let Some(solids) = known.solids(&form.name) else {
+            continue;
+        };
+        let pose = transform(&pose);
+        let mut all = references(&solids);
+        all.push(&pose);
+        recording.log_static(path(&form.name), &all)?;
+    }
     perceived(recording, trace)
 }
 

@@ -97,7 +97,7 @@ class Stage {
       const [x, y, z] = thing.at;
       labels.add("seen", `seen: ${thing.name}`, () => this.seen.visible && box.visible ? near([x, y, z + thing.size[2]]) : null);
     }
-    for (const still of replay.still.filter(({ kind }) => kind !== "Wall")) {
+    for (const still of replay.still.filter(({ kind }) => kind !== "Wall" && kind !== "robot")) {
       const [x, y, z] = still.at;
       labels.add("other", still.name, () => near([x, y, z + above(forms[still.form])]));
     }
