@@ -45,6 +45,7 @@ fn robot() -> Arc<RobotProfile> {
     Arc::new(RobotProfile {
         name: "mobile manipulator".to_owned(),
         urdf: Source::new("robot.urdf", "<robot/>"),
+        tree: Arc::default(),
         base_joints: None,
         planar_base: false,
         mount_height_m: 0.0,

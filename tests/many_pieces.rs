@@ -38,10 +38,7 @@ fn cut(urdf: &str) -> String {
 /// The robot with another URDF.
 fn changed(profile: &RobotProfile, change: impl Fn(&str) -> String) -> Arc<RobotProfile> {
     let urdf = Source::new("changed.urdf", change(&profile.urdf.text));
-    Arc::new(RobotProfile {
-        urdf,
-        ..profile.clone()
-    })
+    Arc::new(actcheck::config::robot::with_urdf(profile.clone(), urdf).expect("it is a URDF"))
 }
 
 /// The scene with the robot's fingers cut.
@@ -251,14 +248,15 @@ fn arm_on_a_table() -> Scene {
 #[test]
 fn links_that_are_hardly_apart_leave_only_their_motion_to_the_engine() {
     let mut scene = arm_on_a_table();
-    let mut profile = (*scene.robot.profile).clone();
+    let profile = (*scene.robot.profile).clone();
     let bar = "<collision><origin xyz=\"0.0179 0 0.2\"/><geometry><box size=\"0.01 0.3 0.01\"/></geometry></collision>";
     let text = profile.urdf.text.replace(
         "<link name=\"wrist_pitch_link\">",
         &format!("<link name=\"wrist_pitch_link\">{bar}"),
     );
     assert!(text.contains(bar));
-    profile.urdf = Source::new("bar.urdf", text);
+    let urdf = Source::new("bar.urdf", text);
+    let profile = actcheck::config::robot::with_urdf(profile, urdf).expect("it is a URDF");
     scene.robot.profile = Arc::new(profile);
     let mut world = build(&scene).expect("the scene is right");
     assert!(world.settle().settled);

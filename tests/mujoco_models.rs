@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use actcheck::base::Files;
+use actcheck::base::{Files, Severity};
 use actcheck::config;
 use actcheck::data::{ModelTree, TreeGeometry, TreeJoint, TreeMotion, TreeSolid};
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
@@ -105,7 +105,10 @@ fn compared(python: &Path, files: &[PathBuf]) -> Counts {
         }
         match config::robot::bare(&Files::Disk, &path, &[], &[]) {
             Err(said) => {
-                let first = said.iter().find(|fault| fault.is_error()).unwrap();
+                let first = said
+                    .iter()
+                    .find(|fault| fault.severity == Severity::Error)
+                    .unwrap();
                 let reason: String = first
                     .message
                     .chars()
