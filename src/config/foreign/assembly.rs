@@ -4,12 +4,14 @@
 use std::collections::VecDeque;
 
 use crate::foreign::body::{Body, MovingBody};
-use crate::foreign::xml::{Node, Reader};
+use crate::foreign::xml::Reader;
+use actcheck_base::Span;
 use actcheck_data::PartJoint;
 
 /// A joint between two links, by their indices.
-pub(crate) struct Join<'a> {
-    pub(crate) node: Node<'a>,
+pub(crate) struct Join {
+    /// The joint in the text.
+    pub(crate) at: Span,
     pub(crate) parent: usize,
     pub(crate) child: usize,
     /// `None` if it is fixed.
@@ -18,24 +20,24 @@ pub(crate) struct Join<'a> {
 
 /// The body of each link, and the joint that moves each body. Body 0 is the object itself; each of
 /// the others comes after the one that carries it.
-pub(crate) struct Assembly<'a> {
+pub(crate) struct Assembly {
     bodies: Vec<usize>,
-    moved: Vec<Moved<'a>>,
+    moved: Vec<Moved>,
 }
 
 /// A body that a joint moves.
-struct Moved<'a> {
-    node: Node<'a>,
+struct Moved {
+    at: Span,
     carrier: usize,
     /// A link of it.
     link: usize,
     joint: PartJoint,
 }
 
-impl<'a> Assembly<'a> {
+impl Assembly {
     /// Finds the bodies of links. Reports W035 if two joints move one body or joints form a cycle;
     /// then all links are one.
-    pub(crate) fn of(n_links: usize, joins: &[Join<'a>], reader: &mut Reader) -> Self {
+    pub(crate) fn of(n_links: usize, joins: &[Join], reader: &mut Reader) -> Self {
         let rigid = Self {
             bodies: vec![0; n_links],
             moved: Vec::new(),
@@ -48,7 +50,7 @@ impl<'a> Assembly<'a> {
                 .filter(|group| **group == from)
                 .for_each(|group| *group = to);
         }
-        let moving: Vec<(&Join<'a>, PartJoint)> = joins
+        let moving: Vec<(&Join, PartJoint)> = joins
             .iter()
             .filter_map(|join| join.joint.map(|joint| (join, joint)))
             .collect();
@@ -61,9 +63,9 @@ impl<'a> Assembly<'a> {
         for (join, _) in &moving {
             if movers(groups[join.child]) > 1 {
                 let message = "two joints move the same links".to_owned();
-                reader.error(
+                reader.error_at(
                     "W035",
-                    join.node,
+                    join.at.clone(),
                     message,
                     "links form one tree: remove one of the joints",
                 );
@@ -75,13 +77,13 @@ impl<'a> Assembly<'a> {
             .iter()
             .map(|group| (movers(*group) == 0).then_some(0))
             .collect();
-        let (mut moved, mut left): (Vec<Moved<'a>>, VecDeque<_>) =
+        let (mut moved, mut left): (Vec<Moved>, VecDeque<_>) =
             (Vec::new(), moving.iter().collect());
         let mut tries = left.len();
         while let Some(next @ (join, joint)) = left.pop_front() {
             if let Some(carrier) = bodies[join.parent] {
                 moved.push(Moved {
-                    node: join.node,
+                    at: join.at.clone(),
                     carrier,
                     link: join.child,
                     joint: *joint,
@@ -95,9 +97,9 @@ impl<'a> Assembly<'a> {
                 tries -= 1;
                 left.push_back(next);
             } else {
-                reader.error(
+                reader.error_at(
                     "W035",
-                    join.node,
+                    join.at.clone(),
                     "the joints form a cycle".to_owned(),
                     "links form one tree",
                 );
@@ -136,19 +138,15 @@ impl<'a> Assembly<'a> {
             if body.parts.is_empty() {
                 let message = format!("the link `{link}` has no `<collision>`");
                 if self.moved.iter().any(|other| other.carrier == idx + 1) {
-                    reader.error(
+                    reader.error_at(
                         "W035",
-                        moved.node,
+                        moved.at.clone(),
                         message,
                         "a link that a joint moves and that carries others needs one",
                     );
                 } else {
-                    reader.warning(
-                        "W036",
-                        moved.node,
-                        message,
-                        "the model works without the link",
-                    );
+                    let help = "the link is left out: nothing can touch it";
+                    reader.warning_at("W036", moved.at.clone(), message, help);
                 }
                 parts.push(None);
                 continue;

@@ -8,6 +8,7 @@ mod assembly;
 mod body;
 mod building;
 mod collada;
+mod elements;
 mod folder;
 mod footprint;
 mod fronts;
@@ -29,12 +30,20 @@ pub(crate) mod robot_shapes;
 pub(crate) mod robot_text;
 pub(crate) mod robot_tree;
 mod sdf;
+mod sdf_inertial;
 mod sdf_joint;
+mod sdf_link;
 mod sdf_pose;
 pub(crate) mod sdf_robot;
+mod sdf_surface;
+mod solids;
+#[cfg(test)]
+mod stated_tests;
 mod urdf;
+mod urdf_extra;
 mod urdf_text;
 pub(crate) mod world;
+mod world_state;
 mod xml;
 
 pub(crate) use folder::{find, read};
