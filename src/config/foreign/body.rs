@@ -20,6 +20,26 @@ const SMALLEST_SURFACE_M: f64 = 0.15;
 /// Share of its bounding rectangle that a mesh's top must fill to count as a surface.
 const FULL: f64 = 0.95;
 
+/// The part that a model has in scenes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Role {
+    /// It moves, unless it is static.
+    Object,
+    /// It is a part of a world, where nothing moves: its joints stay as in the file.
+    Furniture,
+}
+
+/// A model read from SDF or URDF.
+pub(crate) struct SdfModel {
+    pub(crate) body: Body,
+    /// Pose of the model's origin in the file.
+    pub(crate) pose: Isometry3<f64>,
+    /// Whether the file says that it never moves.
+    pub(crate) is_static: bool,
+    /// Digest of the file and its meshes.
+    pub(crate) digest: String,
+}
+
 /// A rigid body. Frame: the file's own.
 #[derive(Default)]
 pub(crate) struct Body {

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Isometry3;
 
+use crate::foreign::body::{Role, SdfModel};
 use crate::foreign::footprint::turned;
+use crate::foreign::frames::Included;
 use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
-use crate::foreign::nested::{Role, SubModel, Tree};
-use crate::foreign::sdf::SdfModel;
-use crate::foreign::sdf_pose::Included;
+use crate::foreign::nested::{SubModel, Tree};
 use crate::foreign::urdf::{Materials, Shapeless};
 use crate::foreign::xml::{self, Node, Reader};
 use crate::foreign::{mjcf, sdf, urdf};

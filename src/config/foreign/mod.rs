@@ -11,6 +11,7 @@ mod collada;
 mod elements;
 mod folder;
 mod footprint;
+mod frames;
 mod fronts;
 mod geometry;
 pub(crate) mod lenient;

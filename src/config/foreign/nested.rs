@@ -5,13 +5,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::foreign::assembly::{Assembly, Join};
-use crate::foreign::body::Body;
+use crate::foreign::body::{Body, Role};
 use crate::foreign::elements::Children;
 use crate::foreign::folder;
+use crate::foreign::frames::{Frame, Included, OWN};
 use crate::foreign::geometry::Shapes;
 use crate::foreign::sdf::is_static;
-use crate::foreign::sdf_pose::{self, Frame, Included, pose, prefix};
-use crate::foreign::sdf_surface::{Surface, refuse_self_collision, warn_of_usual_friction};
+use crate::foreign::sdf_pose::{self, pose, prefix};
+use crate::foreign::sdf_surface::{
+    Surface, prefixed, refuse_self_collision, warn_of_usual_friction,
+};
 use crate::foreign::xml::{self, Node, Reader};
 use crate::foreign::{sdf_joint, sdf_link};
 use actcheck_base::Span;
@@ -42,19 +45,18 @@ const MODEL: Children = Children {
     refused: &[],
 };
 const INCLUDE: Children = Children {
-    read: &["uri", "name", "pose", "static", "placement_frame", "plugin"],
+    read: &[
+        "uri",
+        "name",
+        "pose",
+        "static",
+        "placement_frame",
+        "plugin",
+        "experimental_params",
+    ],
     harmless: &[],
     refused: &[],
 };
-
-/// The part that a model has in scenes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Role {
-    /// It moves, unless it is static.
-    Object,
-    /// It is a part of a world, where nothing moves: its joints stay as in the file.
-    Furniture,
-}
 
 /// A link with its solids and its mass. Frame: that of the outermost model.
 pub(crate) struct Link {
@@ -172,7 +174,7 @@ impl Tree {
             collides: None,
         };
         let moving = std::mem::take(&mut base.moving);
-        tree.push_body(sdf_pose::OWN.to_owned(), base);
+        tree.push_body(OWN.to_owned(), base);
         for part in moving {
             tree.joints.push(Joint {
                 name: part.name.clone(),
@@ -587,8 +589,7 @@ fn include(
 /// Reports the elements of an `<include>` that are not read.
 pub(crate) fn check_include(include: Node, reader: &mut Reader) {
     INCLUDE.check(include, reader);
-    let is_change = |child: &Node| child.tag_name().name() == "params";
-    if let Some(params) = include.children().find(is_change) {
+    if let Some(params) = prefixed(include, "experimental", "params") {
         let message = "changes of an included model can't be read".to_owned();
         let help = "write the changed model to a folder of its own";
         reader.error("W035", params, message, help);

@@ -2,30 +2,18 @@
 
 use std::path::Path;
 
-use nalgebra::Isometry3;
-
-use crate::foreign::body::Body;
+use crate::foreign::body::{Role, SdfModel};
+use crate::foreign::frames::Included;
 use crate::foreign::geometry::Shapes;
 use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
-use crate::foreign::nested::{Role, SubModel, Tree};
-use crate::foreign::sdf_pose::{self, Included, pose};
+use crate::foreign::nested::{SubModel, Tree};
+use crate::foreign::sdf_pose::{self, pose};
 use crate::foreign::xml::{self, Node, Reader};
 use actcheck_base::{Diagnostics, Source};
 
 /// Supported minor versions of SDF 1.
 const VERSIONS: std::ops::RangeInclusive<u32> = 3..=12;
-
-/// A model read from SDF or URDF.
-pub(crate) struct SdfModel {
-    pub(crate) body: Body,
-    /// Pose of the model's origin in the file.
-    pub(crate) pose: Isometry3<f64>,
-    /// Whether the file says that it never moves.
-    pub(crate) is_static: bool,
-    /// Digest of the file and its meshes.
-    pub(crate) digest: String,
-}
 
 /// Reads the object of an SDF file and its faults. The model is `None` if there are errors.
 pub(crate) fn read(

@@ -2,10 +2,9 @@
 
 use nalgebra::{Isometry3, Translation3};
 
-use crate::foreign::body::Body;
+use crate::foreign::body::{Body, Role};
 use crate::foreign::elements::Children;
 use crate::foreign::geometry::{Shapes, check_volume};
-use crate::foreign::nested::Role;
 use crate::foreign::sdf_inertial::{self, Solid};
 use crate::foreign::sdf_pose::pose;
 use crate::foreign::sdf_surface::Surface;
@@ -47,6 +46,7 @@ const COLLISION: Children = Children {
         "max_contacts",
         "laser_retro",
         "density",
+        "drake_proximity_properties",
     ],
     harmless: &["auto_inertia_params"],
     refused: &[],

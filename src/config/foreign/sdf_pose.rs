@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Isometry3;
 
+use crate::foreign::frames::{Frame, Included, OWN};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::did_you_mean;
 
@@ -12,32 +13,6 @@ use actcheck_base::did_you_mean;
 const LONGEST: usize = 64;
 /// The elements that have a frame of their own.
 const WITH_FRAME: [&str; 5] = ["link", "joint", "frame", "model", "include"];
-/// The name of a model's own frame.
-pub(crate) const OWN: &str = "__model__";
-
-/// A frame that other elements can name.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Frame {
-    /// Frame: that of the model.
-    pub(crate) pose: Isometry3<f64>,
-    /// The link that carries it; `None` in a model without links.
-    pub(crate) link: Option<String>,
-}
-
-/// The pose and the frames of an included model, as its own file states them.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Included {
-    pub(crate) name: String,
-    /// The `<pose>` of the model: that of its placement frame.
-    pub(crate) stated: Isometry3<f64>,
-    /// Its placement frame. Frame: that of the model.
-    pub(crate) placement: Isometry3<f64>,
-    /// Whether its frames are those of the model that includes it.
-    pub(crate) merged: bool,
-    /// All frames by name, with that of the model itself.
-    pub(crate) frames: BTreeMap<String, Frame>,
-}
-
 /// Reads the pose of an element; the identity if it has none. It is in the frame in which SDF reads
 /// a pose that names none: that of the parent element or, for a joint, that of its child link. Of a
 /// model and an `<include>`, this is the pose of the model's own frame, whichever frame of it the

@@ -1,8 +1,7 @@
 //! Reads the `<surface>` of a collision in SDF: friction and restitution.
 
-use crate::foreign::body::{Body, FRICTION};
+use crate::foreign::body::{Body, FRICTION, Role};
 use crate::foreign::elements::{Children, refuse_switch, refuse_unless};
-use crate::foreign::nested::Role;
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::Span;
 
@@ -70,8 +69,12 @@ pub(crate) struct Surface {
 impl Surface {
     /// Reads the `<surface>` of a collision. Reports values that can't be simulated (W035).
     pub(crate) fn of(collision: Node, role: Role, reader: &mut Reader) -> Self {
+        let of_drake = Self {
+            friction: drake_friction(collision, reader),
+            ..Self::default()
+        };
         let Some(surface) = xml::child(collision, "surface") else {
-            return Self::default();
+            return of_drake;
         };
         SURFACE.check(surface, reader);
         if let Some(contact) = xml::child(surface, "contact") {
@@ -83,6 +86,7 @@ impl Surface {
             restitution: xml::child(surface, "bounce")
                 .and_then(|bounce| restitution(bounce, reader)),
         }
+        .or(of_drake)
     }
 
     /// Fills gaps with the values of another surface.
@@ -151,6 +155,27 @@ fn differs(at: Span, message: String, help: &str, role: Role, reader: &mut Reade
             reader.warning_at("W036", at, format!("{message}: the first is used"), help);
         }
     }
+}
+
+/// Returns a child whose name has a prefix, declared or not.
+pub(crate) fn prefixed<'a>(node: Node<'a>, prefix: &str, name: &str) -> Option<Node<'a>> {
+    let joined = format!("{prefix}_{name}");
+    let is_named = |child: &Node| {
+        let tag = child.tag_name();
+        tag.name() == joined || (tag.name() == name && tag.namespace().is_some())
+    };
+    node.children().find(is_named)
+}
+
+/// Returns the coefficient of sliding friction in Drake's `<drake:proximity_properties>`, of which
+/// SDF has texts and URDF has attributes.
+pub(crate) fn drake_friction(collision: Node, reader: &mut Reader) -> Option<f64> {
+    let properties = prefixed(collision, "drake", "proximity_properties")?;
+    let of = |name| prefixed(properties, "drake", name);
+    let node = of("mu_dynamic").or_else(|| of("mu_static"))?;
+    let written = node.attribute("value").unwrap_or(xml::text(node));
+    let [friction] = reader.numbers::<1>(node, written, Bound::NotNegative)?;
+    Some(friction)
 }
 
 /// Returns the coefficient of sliding friction: that for ODE, or else that for Bullet.

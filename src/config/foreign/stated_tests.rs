@@ -233,6 +233,11 @@ fn materials_of_sdf_are_read_or_refused() {
         assert_eq!(warnings, "", "{surface}");
         assert_eq!((model.friction, model.restitution), (friction, restitution), "{surface}");
     }
+    let drake = link(&format!(
+        "<collision name=\"c\">{BOX}<drake:proximity_properties><drake:mu_dynamic>0.7</drake:mu_dynamic>\
+         </drake:proximity_properties></collision>"
+    ));
+    assert_eq!(drake.map(|(model, _)| model.friction), Ok(0.7));
     for (surface, expected) in [
         (friction("<ode><mu>0.3</mu><mu2>0.5</mu2></ode>"), "depend on the direction"),
         (friction("<ode><slip1>0.1</slip1></ode>"), "`<slip1>` of 0.1"),
@@ -300,6 +305,11 @@ fn materials_of_urdf_are_read_or_refused() {
             (friction, restitution, false)
         );
     }
+    let drake = urdf(
+        "<link name=\"l\" xmlns:drake=\"d\"><collision><geometry><box size=\"0.05 0.08 0.04\"/></geometry><drake:proximity_properties>\
+         <drake:mu_dynamic value=\"0.7\"/></drake:proximity_properties></collision></link>",
+    );
+    assert_eq!(drake.map(|(model, _)| model.friction), Ok(0.7));
     let (scaled, _) = of(&pybullet("<inertia_scaling value=\"3\"/>"), "").expect("it has moments");
     near(
         scaled.inertia.expect("they are stated").about_com[0][0],

@@ -6,12 +6,10 @@ use std::path::Path;
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use crate::foreign::assembly::{Assembly, Join};
-use crate::foreign::body::{Body, Mass};
+use crate::foreign::body::{Body, Mass, Role, SdfModel};
 use crate::foreign::geometry::{Shapes, check_volume};
 use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
-use crate::foreign::nested::Role;
-use crate::foreign::sdf::SdfModel;
 use crate::foreign::sdf_inertial::possible;
 use crate::foreign::sdf_surface::{refuse_self_collision, warn_of_usual_friction};
 use crate::foreign::urdf_extra::{self, Extras};

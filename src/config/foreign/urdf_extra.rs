@@ -3,10 +3,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::foreign::body::Mass;
+use crate::foreign::body::{Mass, Role};
 use crate::foreign::elements::{Children, refuse_switch, refuse_unless};
-use crate::foreign::nested::Role;
-use crate::foreign::sdf_surface::{Surface, isotropic};
+use crate::foreign::sdf_surface::{Surface, drake_friction, isotropic};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::Span;
 
@@ -21,7 +20,12 @@ pub(crate) const LINK: Children = Children {
     refused: &[],
 };
 pub(crate) const COLLISION: Children = Children {
-    read: &["origin", "geometry", "contact_coefficients"],
+    read: &[
+        "origin",
+        "geometry",
+        "contact_coefficients",
+        "drake_proximity_properties",
+    ],
     harmless: &["material", "verbose"],
     refused: &[],
 };
@@ -207,7 +211,7 @@ impl Contact {
             Some(mu)
         });
         let own = Surface {
-            friction,
+            friction: friction.or(drake_friction(collision, reader)),
             ..Surface::default()
         };
         own.or(self.surface)

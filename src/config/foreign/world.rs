@@ -7,13 +7,13 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
-use crate::foreign::body::Body;
+use crate::foreign::body::{Body, Role};
 use crate::foreign::building::{self, Solid, Split};
 use crate::foreign::elements::Children;
 use crate::foreign::geometry::Shapes;
 use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
-use crate::foreign::nested::{Role, SubModel, Tree, check_include, register};
+use crate::foreign::nested::{SubModel, Tree, check_include, register};
 use crate::foreign::sdf::check_version;
 use crate::foreign::sdf_pose::pose;
 use crate::foreign::urdf::Shapeless;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-use crate::foreign::sdf_pose::Included;
+use crate::foreign::frames::Included;
 use actcheck_base::{Diagnostic, Diagnostics, Source, Span, check_xml, did_you_mean};
 
 /// Longest text of a model, robot or world; meshes have files of their own. Unit: bytes.
