@@ -54,6 +54,7 @@ pub(crate) fn read(
     let mut other_counts = OtherCounts::default();
     let mut lying = (0.0, 0.0);
     let nav_may_block = read_nav(root, found);
+    let mut worlds = Vec::new();
     let has_others = root.key_span("surfaceObjects").is_some();
     let has_surface = root.key_span("objectSurface").is_some();
     for (name, key, kind) in PAPER_TABLES {
@@ -79,6 +80,13 @@ pub(crate) fn read(
         }
         if name == "pickObject" {
             lying.0 = table.number("lying", 0.0..=1.0).unwrap_or(0.0);
+        }
+        match name {
+            "world" => worlds.clone_from(&values),
+            "objectLocation" if !has_surface => {
+                library.check_locations_of(&mut table, &worlds, &values);
+            }
+            _ => {}
         }
         keep(name, table.span(), values, &mut candidates, places);
         table.finish(found);

@@ -463,6 +463,43 @@ impl ModelLibrary {
         }
     }
 
+    /// Reports worlds that have none of the named locations (C021), unless no world has them: then
+    /// each name is reported already. For scenes without a surface, in front of which a location
+    /// could be.
+    pub(crate) fn check_locations_of(
+        &self,
+        table: &mut Table,
+        worlds: &[Located<String>],
+        names: &[Located<String>],
+    ) {
+        let has_any = |world: &WorldMap| {
+            let mut there = world.locations.iter();
+            there.any(|location| names.iter().any(|name| name.value == location.name))
+        };
+        if !self.worlds.values().any(|world| has_any(world)) {
+            return;
+        }
+        for name in worlds {
+            let Some(world) = self.worlds.get(&name.value).filter(|world| !has_any(world)) else {
+                continue;
+            };
+            let message = format!("the world `{}` has none of the locations", name.value);
+            let there: Vec<&str> = world
+                .locations
+                .iter()
+                .map(|location| location.name.as_str())
+                .collect();
+            let help = match there.is_empty() {
+                true => "it has no locations: remove the world from the list".to_owned(),
+                false => format!(
+                    "add one of its own to `location_list`: {}",
+                    there.join(", ")
+                ),
+            };
+            table.fault("C021", name.span.clone(), message, help);
+        }
+    }
+
     /// Reports a surface that is not furniture of a named world (C021). If a world has no surfaces,
     /// models are accepted too (else C008).
     pub(crate) fn check_surface(&mut self, table: &mut Table, name: &Located<String>) {

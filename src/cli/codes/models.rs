@@ -123,7 +123,7 @@ const CODES_W: &[Code] = &[
     code(
         "W036",
         "a part of a model file is ignored or replaced, or is that of no real body",
-        "the simulation has no counterpart for it, such as plugins and air drag; one moment of inertia exceeds the sum of \
+        "the simulation has no counterpart for it, such as plugins and sensors; one moment of inertia exceeds the sum of \
          the others; a gripper, or a link that a joint moves, has no `<collision>`; a joint moves the whole robot; the \
          limits of a joint contradict its coupling; or a colour is not four numbers",
         "nothing, if the model works without it; otherwise follow the help",

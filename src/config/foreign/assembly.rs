@@ -141,7 +141,7 @@ impl Assembly {
                         help,
                     ));
                 } else {
-                    let help = "the model works without the link";
+                    let help = "the link is left out: nothing can touch it";
                     found.push(fault(
                         Diagnostic::warning("W036", message),
                         &moved.place,

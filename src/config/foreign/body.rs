@@ -12,13 +12,33 @@ use actcheck_data::{
 /// Density of a body without a mass: that of water, SDF's default. Unit: kg/m³.
 const DENSITY: f64 = 1000.0;
 /// Default friction coefficient, as in SDF.
-const FRICTION: f64 = 1.0;
+pub(crate) const FRICTION: f64 = 1.0;
 /// Largest distance of a supporting surface below the model's highest point. Unit: metres.
 const TOP_DEPTH_M: f64 = 0.003;
 /// Smallest side of a supporting surface. Unit: metres.
 const SMALLEST_SURFACE_M: f64 = 0.15;
 /// Share of its bounding rectangle that a mesh's top must fill to count as a surface.
 const FULL: f64 = 0.95;
+
+/// The part that a model has in scenes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Role {
+    /// It moves, unless it is static.
+    Object,
+    /// It is a part of a world, where nothing moves: its joints stay as in the file.
+    Furniture,
+}
+
+/// A model read from SDF or URDF.
+pub(crate) struct SdfModel {
+    pub(crate) body: Body,
+    /// Pose of the model's origin in the file.
+    pub(crate) pose: Isometry3<f64>,
+    /// Whether the file says that it never moves.
+    pub(crate) is_static: bool,
+    /// Digest of the file and its meshes.
+    pub(crate) digest: String,
+}
 
 /// A rigid body. Frame: the file's own.
 #[derive(Default)]
@@ -29,6 +49,8 @@ pub(crate) struct Body {
     /// Whether a link with shapes has no mass.
     pub(crate) has_unknown_mass: bool,
     pub(crate) friction: Option<f64>,
+    /// Whether a collision leaves its friction at the default.
+    pub(crate) has_usual_friction: bool,
     pub(crate) restitution: Option<f64>,
     pub(crate) fixed: bool,
     /// Bodies that joints move; each after the one that carries it.
@@ -93,6 +115,29 @@ impl Body {
                 .map(|moving| moving.into_part(&model_from_file))
                 .collect(),
             digest,
+        }
+    }
+
+    /// Adds the solids and masses of a body that moves with this one. The material is that of the
+    /// first.
+    pub(crate) fn add(&mut self, other: Self) {
+        self.parts.extend(other.parts);
+        self.masses.extend(other.masses);
+        self.has_unknown_mass |= other.has_unknown_mass;
+        self.has_usual_friction |= other.has_usual_friction;
+        self.friction = self.friction.or(other.friction);
+        self.restitution = self.restitution.or(other.restitution);
+    }
+
+    /// Moves solids and masses from one frame to another. Bodies that joints move stay.
+    pub(crate) fn transform(&mut self, by: &Isometry3<f64>) {
+        let turn = by.rotation.to_rotation_matrix();
+        self.parts = self.placed(by);
+        for mass in &mut self.masses {
+            mass.com = (by * Point3::from(mass.com)).coords;
+            mass.about_com = mass
+                .about_com
+                .map(|moments| turn.matrix() * moments * turn.matrix().transpose());
         }
     }
 

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Isometry3;
 
+use crate::foreign::body::{Role, SdfModel};
 use crate::foreign::footprint::turned;
+use crate::foreign::frames::Included;
 use crate::foreign::geometry::Shapes;
 use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::{Lookup, beside, spellings};
-use crate::foreign::nested::Role;
-use crate::foreign::sdf::SdfModel;
+use crate::foreign::nested::{SubModel, Tree};
 use crate::foreign::xml::{self, Node, Reader};
 use crate::foreign::{mjcf, sdf, tree_object, urdf};
 use actcheck_base::{
@@ -20,7 +21,7 @@ use actcheck_data::ObjectModel;
 /// A model found in a folder.
 #[derive(Debug, Clone)]
 pub(crate) struct Found {
-    /// Name in configurations: the folder's, or that of the URDF or MJCF file without its
+    /// Name in configurations: the folder's, or that of the SDF, URDF or MJCF file without its
     /// extension.
     pub(crate) name: String,
     /// Path of its `model.config`, SDF, URDF or MJCF file.
@@ -28,7 +29,8 @@ pub(crate) struct Found {
 }
 
 /// Finds the models of a folder, sorted by name: `NAME/model.config`, `NAME/model.sdf`,
-/// `NAME/model.urdf`, `NAME.urdf`, and of MJCF `NAME/NAME.xml`, `NAME/model.xml`, `NAME.xml`.
+/// `NAME/model.urdf`, `NAME/NAME.sdf`, `NAME/NAME.urdf`, `NAME.sdf`, `NAME.urdf`, and of MJCF
+/// `NAME/NAME.xml`, `NAME/model.xml`, `NAME.xml`.
 pub(crate) fn find(files: &Files, folder: &Path) -> Vec<Found> {
     let mut found: Vec<Found> = Vec::new();
     for model in files.folders(folder) {
@@ -40,9 +42,7 @@ pub(crate) fn find(files: &Files, folder: &Path) -> Vec<Found> {
         }
     }
     for path in files.list(folder) {
-        let is_model =
-            path.extension().is_some_and(|ending| ending == "urdf") || is_mjcf(files, &path);
-        if let (true, Some(stem)) = (is_model, path.file_stem()) {
+        if let (true, Some(stem)) = (is_model(files, &path), path.file_stem()) {
             found.push(Found {
                 name: stem.to_string_lossy().into_owned(),
                 path: path.clone(),
@@ -70,7 +70,14 @@ pub(crate) struct Read {
 /// (W035), an unusable mesh (W037), no solid shape (W038), or an included model that is missing or
 /// has faults (W040).
 pub(crate) fn read(found: &Found, lookup: &Lookup) -> Result<Read, Diagnostics> {
-    let (sdf, warnings) = read_sdf_model(found, lookup, Role::Object, 0)?;
+    let source = Opened::of(found, lookup)?;
+    let (sdf, warnings) = match source.format {
+        Format::Sdf => {
+            let (model, said) = sdf::read(&source.text, &source.path, lookup);
+            model.map(|model| (model, said.clone())).ok_or(said)?
+        }
+        _ => source.body(lookup)?,
+    };
     let turn = sdf.body.turn_of_footprint(&sdf.pose);
     let pose = if turn == 0.0 {
         sdf.pose
@@ -85,30 +92,86 @@ pub(crate) fn read(found: &Found, lookup: &Lookup) -> Result<Read, Diagnostics> 
     })
 }
 
-/// Reads a model that `depth` others include, as a body. Also returns warnings.
-///
-/// # Errors
-/// As [`read`].
-fn read_sdf_model(
-    found: &Found,
-    lookup: &Lookup,
-    role: Role,
-    depth: usize,
-) -> Result<(SdfModel, Diagnostics), Diagnostics> {
-    let path = match found.path.file_name().and_then(|name| name.to_str()) {
-        Some("model.config") => sdf_path(&found.path, lookup.files)?,
-        _ => found.path.clone(),
-    };
-    let source = lookup
-        .files
-        .read(&path)
-        .map_err(|reason| unreadable(&path, &reason))?;
-    let (model, said) = match path.extension().and_then(|ending| ending.to_str()) {
-        Some("urdf") => urdf::read(&source, &path, lookup),
-        Some("xml") if is_mjcf(lookup.files, &path) => read_mjcf(&source, &path, lookup)?,
-        _ => sdf::read(&source, &path, lookup, role, depth),
-    };
-    model.map(|model| (model, said.clone())).ok_or(said)
+/// A model's file.
+struct Opened {
+    path: PathBuf,
+    text: Source,
+    format: Format,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Format {
+    Sdf,
+    Urdf,
+    Mjcf,
+}
+
+impl Opened {
+    /// Opens the file that a model is, or that its `model.config` names.
+    ///
+    /// # Errors
+    /// The file is unreadable (W030), or `model.config` names none (W033).
+    fn of(found: &Found, lookup: &Lookup) -> Result<Self, Diagnostics> {
+        let path = match found.path.file_name().and_then(|name| name.to_str()) {
+            Some("model.config") => sdf_path(&found.path, lookup.files)?,
+            _ => found.path.clone(),
+        };
+        let text = lookup
+            .files
+            .read(&path)
+            .map_err(|reason| unreadable(&path, &reason))?;
+        let format = match path.extension().and_then(|ending| ending.to_str()) {
+            Some("urdf") => Format::Urdf,
+            Some("xml") if is_mjcf(lookup.files, &path) => Format::Mjcf,
+            _ => Format::Sdf,
+        };
+        Ok(Self { path, text, format })
+    }
+
+    /// Reads an object of URDF or MJCF. Also returns warnings.
+    ///
+    /// # Errors
+    /// As [`read`].
+    fn body(&self, lookup: &Lookup) -> Result<(SdfModel, Diagnostics), Diagnostics> {
+        let (model, said) = if self.format == Format::Mjcf {
+            read_mjcf(&self.text, &self.path, lookup)?
+        } else {
+            urdf::read(&self.text, &self.path, lookup)
+        };
+        model.map(|model| (model, said.clone())).ok_or(said)
+    }
+
+    /// Reads a model that `depth` others include, and that never moves if `fixed`.
+    ///
+    /// # Errors
+    /// As [`read`].
+    fn included(
+        &self,
+        lookup: &Lookup,
+        (role, fixed): (Role, bool),
+        depth: usize,
+    ) -> Result<SubModel, Diagnostics> {
+        if self.format == Format::Sdf {
+            let (model, said) =
+                sdf::read_included(&self.text, &self.path, lookup, (role, fixed), depth);
+            return model.ok_or(said);
+        }
+        let (model, _) = self.body(lookup)?;
+        let (tree, frames) = Tree::of_body(model.body, fixed);
+        let stem = self.path.file_stem();
+        Ok(SubModel {
+            tree,
+            place: Included {
+                name: stem.map_or_else(String::new, |stem| stem.to_string_lossy().into_owned()),
+                stated: model.pose,
+                placement: Isometry3::identity(),
+                merged: false,
+                frames,
+            },
+            is_static: model.is_static,
+            digest: model.digest,
+        })
+    }
 }
 
 /// Reads an object in MJCF and its faults. The object is `None` if there are errors.
@@ -159,16 +222,16 @@ pub(crate) fn name_in(uri: &str) -> String {
 }
 
 /// Reads the model that the `<uri>` of an `<include>` names, which `depth` others include. `known`
-/// are the names that the user may have meant. Reports W040 and returns `None` if the model is
+/// are the names that the user may have meant. The model never moves if `fixed`. Reports W040 and returns `None` if the model is
 /// missing or has faults.
 pub(crate) fn included<'a>(
     uri: Node,
     lookup: &Lookup,
-    role: Role,
+    (role, fixed): (Role, bool),
     depth: usize,
     known: impl Iterator<Item = &'a str>,
     reader: &mut Reader,
-) -> Option<SdfModel> {
+) -> Option<SubModel> {
     let name = name_in(xml::text(uri));
     let Some(found) = named(&name, lookup) else {
         let message = format!("the model `{name}` is missing");
@@ -180,8 +243,10 @@ pub(crate) fn included<'a>(
         reader.error("W040", uri, message, help);
         return None;
     };
-    match read_sdf_model(&found, lookup, role, depth) {
-        Ok((model, _)) => Some(model),
+    let model =
+        Opened::of(&found, lookup).and_then(|opened| opened.included(lookup, (role, fixed), depth));
+    match model {
+        Ok(model) => Some(model),
         Err(faults) => {
             let first = faults
                 .iter()
@@ -208,18 +273,38 @@ fn named(name: &str, lookup: &Lookup) -> Option<Found> {
         [name.clone(), of_web]
     });
     let folder_names: Vec<String> = folder_names.collect();
-    let places = lookup
+    let mut places = lookup
         .folders
         .iter()
         .flat_map(|folder| folder_names.iter().map(|name| folder.join(name)));
-    places
-        .filter_map(|place| {
-            Some(Found {
-                name: name.to_owned(),
-                path: model_file(lookup.files, &place)?,
-            })
+    places.find_map(|place| {
+        let flat = FLAT.map(|ending| place.with_added_extension(ending));
+        let is_file = |path: &PathBuf| {
+            is_model(lookup.files, path)
+                && lookup
+                    .files
+                    .list(path.parent().unwrap_or(Path::new("")))
+                    .contains(path)
+        };
+        let path = model_file(lookup.files, &place).or_else(|| {
+            std::iter::once(place.clone())
+                .chain(flat)
+                .find(|path| is_file(path))
+        })?;
+        Some(Found {
+            name: name.to_owned(),
+            path,
         })
-        .next()
+    })
+}
+
+/// The endings of models that are a file in a folder of models.
+const FLAT: [&str; 3] = ["sdf", "urdf", "xml"];
+
+/// Whether a path is that of a model by its ending; one of MJCF also by its root.
+fn is_model(files: &Files, path: &Path) -> bool {
+    let ends_in = |ending: &str| path.extension().is_some_and(|found| found == ending);
+    ends_in("sdf") || ends_in("urdf") || is_mjcf(files, path)
 }
 
 /// Returns the file of a model's folder that names or is the model.
@@ -228,14 +313,15 @@ fn model_file(files: &Files, folder: &Path) -> Option<PathBuf> {
     let known = ["model.config", "model.sdf", "model.urdf"].map(|file| folder.join(file));
     let of_name = folder
         .file_name()
-        .map(|name| folder.join(name).with_added_extension("xml"));
-    let in_mjcf = of_name
+        .map(|name| FLAT.map(|ending| folder.join(name).with_added_extension(ending)));
+    let others = of_name
         .into_iter()
+        .flatten()
         .chain([folder.join("model.xml")])
-        .filter(|path| is_mjcf(files, path));
+        .filter(|path| is_model(files, path));
     known
         .into_iter()
-        .chain(in_mjcf)
+        .chain(others)
         .find(|path| inside.contains(path))
 }
 

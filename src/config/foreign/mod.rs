@@ -8,8 +8,10 @@ mod assembly;
 mod body;
 mod building;
 mod collada;
+mod elements;
 mod folder;
 mod footprint;
+mod frames;
 mod fronts;
 mod geometry;
 mod gltf;
@@ -31,15 +33,23 @@ pub(crate) mod robot_inertia;
 pub(crate) mod robot_shapes;
 
 mod sdf;
+mod sdf_inertial;
 mod sdf_joint;
+mod sdf_link;
 mod sdf_pose;
 pub(crate) mod sdf_robot;
+mod sdf_surface;
 mod solid_mass;
+mod solids;
+#[cfg(test)]
+mod stated_tests;
 mod tree_checks;
 mod tree_object;
 mod urdf;
+mod urdf_extra;
 mod urdf_tree;
 pub(crate) mod world;
+mod world_state;
 mod xml;
 
 pub(crate) use folder::{find, read};

@@ -1,240 +1,569 @@
 //! The links of an SDF model together with those of the models in it.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use crate::foreign::assembly::{Assembly, Join, free_name};
-use crate::foreign::body::{Body, Mass, MovingBody};
+use crate::foreign::assembly::{Assembly, Join};
+use crate::foreign::body::{Body, Role};
+use crate::foreign::elements::Children;
 use crate::foreign::folder;
+use crate::foreign::frames::{Frame, Included, OWN};
 use crate::foreign::geometry::Shapes;
-use crate::foreign::sdf_joint;
-use crate::foreign::sdf_pose::pose;
+use crate::foreign::sdf::is_static;
+use crate::foreign::sdf_pose::{self, pose, prefix};
+use crate::foreign::sdf_surface::{
+    Surface, prefixed, refuse_self_collision, warn_of_usual_friction,
+};
 use crate::foreign::xml::{self, Node, Reader};
-use actcheck_data::{Part, PartJoint, Pose};
+use crate::foreign::{sdf_joint, sdf_link};
+use actcheck_base::Span;
+use actcheck_data::PartJoint;
 
 /// Deepest inclusion of models: deeper ones include themselves.
 const DEEPEST: usize = 8;
-/// Elements of a model that are read, or that do not affect its body.
-const KNOWN: [&str; 15] = [
-    "link",
-    "joint",
-    "static",
-    "pose",
-    "frame",
-    "self_collide",
-    "allow_auto_disable",
-    "enable_wind",
-    "plugin",
-    "model",
-    "include",
-    "gripper",
-    "name",
-    "origin",
-    "placement_frame",
-];
+/// Of the elements that are read, `allow_auto_disable`, `name` and `origin` have no effect.
+const MODEL: Children = Children {
+    read: &[
+        "link",
+        "joint",
+        "static",
+        "pose",
+        "frame",
+        "self_collide",
+        "allow_auto_disable",
+        "enable_wind",
+        "plugin",
+        "model",
+        "include",
+        "gripper",
+        "name",
+        "origin",
+        "placement_frame",
+    ],
+    harmless: &[],
+    refused: &[],
+};
+const INCLUDE: Children = Children {
+    read: &[
+        "uri",
+        "name",
+        "pose",
+        "static",
+        "placement_frame",
+        "plugin",
+        "experimental_params",
+    ],
+    harmless: &[],
+    refused: &[],
+};
 
-/// The part that a model has in scenes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Role {
-    /// It moves, unless it is static.
-    Object,
-    /// It is a part of a world, where nothing moves: its joints stay as in the file.
-    Furniture,
+/// A link with its solids and its mass. Frame: that of the outermost model.
+pub(crate) struct Link {
+    /// With the names of the models in the outermost one that contain it.
+    pub(crate) name: String,
+    pub(crate) pose: Isometry3<f64>,
+    pub(crate) body: Body,
+    /// The link, or the `<include>` of its model.
+    at: Span,
 }
 
-/// Links, joints and included models. Poses are in the frame of the outermost model.
-pub(crate) struct Links<'a> {
-    pub(crate) links: Vec<(Node<'a>, Isometry3<f64>)>,
-    joints: Vec<(Node<'a>, Isometry3<f64>)>,
-    includes: Vec<(Node<'a>, Isometry3<f64>)>,
+/// A joint between two links, by their indices, or between a link and the world.
+struct Joint {
+    name: String,
+    /// The joint, or the `<include>` of its model.
+    at: Span,
+    parent: Option<usize>,
+    child: Option<usize>,
+    /// `None` if it is fixed.
+    moves: Option<PartJoint>,
+    /// Whether it ties its child to the world.
+    to_world: bool,
 }
 
-impl<'a> Links<'a> {
-    /// Collects those of a model and of the models nested in it.
-    pub(crate) fn of(model: Node<'a>, role: Role, reader: &mut Reader) -> Self {
-        let mut links = Self {
+/// A model as its files state it, with nested and included ones.
+pub(crate) struct Tree {
+    /// The model in the text.
+    at: Span,
+    pub(crate) links: Vec<Link>,
+    joints: Vec<Joint>,
+    /// Whether the file says that the model never moves, or it is part of such a model.
+    fixed: bool,
+    /// Whether a joint has a fault that is reported already.
+    has_faulty_joint: bool,
+    /// A switch by which links collide with each other.
+    collides: Option<Span>,
+}
+
+/// A model that another one includes.
+pub(crate) struct SubModel {
+    pub(crate) tree: Tree,
+    pub(crate) place: Included,
+    pub(crate) is_static: bool,
+    /// Digest of the file and its meshes.
+    pub(crate) digest: String,
+}
+
+/// A link or joint of a model, before it is read.
+struct Written<'a> {
+    node: Node<'a>,
+    /// Pose of its model in the outermost one.
+    model: Isometry3<f64>,
+    /// The beginning of the names in its model.
+    prefix: String,
+}
+
+/// The elements of a model and of the models nested in it, and the models that they include.
+#[derive(Default)]
+struct Elements<'a> {
+    links: Vec<Written<'a>>,
+    joints: Vec<Written<'a>>,
+    includes: Vec<Written<'a>>,
+    /// A switch by which links of a model that can move collide with each other.
+    collides: Option<Span>,
+    models: BTreeMap<usize, SubModel>,
+}
+
+impl Tree {
+    /// Reads a model. `fixed`: it is part of a model that never moves.
+    pub(crate) fn read(
+        model: Node,
+        role: Role,
+        fixed: bool,
+        shapes: &mut Shapes,
+        reader: &mut Reader,
+    ) -> Self {
+        let fixed = role == Role::Furniture || fixed || is_static(model, reader);
+        let mut elements = Elements::default();
+        elements.include_all(model, (role, fixed), shapes, reader);
+        elements.collect(model, &Isometry3::identity(), "", (role, fixed), reader);
+        let mut tree = Self {
+            at: xml::span(model),
             links: Vec::new(),
             joints: Vec::new(),
-            includes: Vec::new(),
+            fixed,
+            has_faulty_joint: false,
+            collides: elements.collides.take(),
         };
-        links.collect(model, &Isometry3::identity(), role, reader);
-        links
+        let stays = fixed || elements.stay();
+        for link in &elements.links {
+            tree.read_link(link, (role, stays), shapes, reader);
+        }
+        tree.add_included(&mut elements, shapes, reader);
+        for joint in &elements.joints {
+            match fixed {
+                true => warn_of_motion(joint.node, role, reader),
+                false => match tree.read_joint(joint, reader) {
+                    Some(joint) => tree.joints.push(joint),
+                    None => tree.has_faulty_joint = true,
+                },
+            }
+        }
+        tree
     }
 
-    fn collect(&mut self, model: Node<'a>, at: &Isometry3<f64>, role: Role, reader: &mut Reader) {
-        reader.warn_about_unknown_children(model, &KNOWN);
-        for child in model.children().filter(Node::is_element) {
+    /// Converts a body of another format, with those that joints move, to links. Returns their
+    /// frames, too. `fixed`: it is part of a model that never moves.
+    pub(crate) fn of_body(mut base: Body, fixed: bool) -> (Self, BTreeMap<String, Frame>) {
+        let mut tree = Self {
+            at: 0..0,
+            links: Vec::new(),
+            joints: Vec::new(),
+            fixed: fixed || base.fixed,
+            has_faulty_joint: false,
+            collides: None,
+        };
+        let moving = std::mem::take(&mut base.moving);
+        tree.push_body(OWN.to_owned(), base);
+        for part in moving {
+            tree.joints.push(Joint {
+                name: part.name.clone(),
+                at: 0..0,
+                parent: Some(part.on.map_or(0, |idx| idx + 1)),
+                child: Some(tree.links.len()),
+                moves: Some(part.joint),
+                to_world: false,
+            });
+            tree.push_body(part.name, part.body);
+        }
+        let frames = tree.links.iter().map(|link| {
+            let frame = Frame {
+                pose: link.pose,
+                link: Some(link.name.clone()),
+            };
+            (link.name.clone(), frame)
+        });
+        let frames = frames.collect();
+        (tree, frames)
+    }
+
+    fn push_body(&mut self, name: String, body: Body) {
+        self.links.push(Link {
+            name,
+            pose: Isometry3::identity(),
+            body,
+            at: 0..0,
+        });
+    }
+
+    fn read_link(
+        &mut self,
+        link: &Written,
+        (role, stays): (Role, bool),
+        shapes: &mut Shapes,
+        reader: &mut Reader,
+    ) {
+        let at = link.model * pose(link.node, reader).unwrap_or_default();
+        let body = sdf_link::read(link.node, &at, (role, stays), shapes, reader);
+        let name = link.node.attribute("name").unwrap_or_default();
+        self.links.push(Link {
+            name: format!("{}{name}", link.prefix),
+            pose: at,
+            body,
+            at: xml::span(link.node),
+        });
+    }
+
+    /// Adds the links and joints of included models.
+    fn add_included(&mut self, elements: &mut Elements, shapes: &mut Shapes, reader: &mut Reader) {
+        for include in &elements.includes {
+            let Some(model) = elements.models.remove(&include.node.range().start) else {
+                continue;
+            };
+            shapes.digest.update(model.digest.as_bytes());
+            if let Some(own) = pose(include.node, reader) {
+                let prefix = format!("{}{}", include.prefix, prefix(include.node, reader));
+                self.add(model.tree, &(include.model * own), &prefix, include.node);
+            }
+        }
+    }
+
+    /// Adds a model at a pose. Its places in its own file become that of the `<include>`.
+    fn add(&mut self, other: Self, at: &Isometry3<f64>, prefix: &str, include: Node) {
+        let first = self.links.len();
+        self.links.extend(other.links.into_iter().map(|mut link| {
+            link.body.transform(at);
+            link.body.fixed = self.fixed;
+            Link {
+                name: format!("{prefix}{}", link.name),
+                pose: at * link.pose,
+                body: link.body,
+                at: xml::span(include),
+            }
+        }));
+        self.joints
+            .extend(other.joints.into_iter().map(|joint| Joint {
+                name: format!("{prefix}{}", joint.name),
+                at: xml::span(include),
+                parent: joint.parent.map(|idx| idx + first),
+                child: joint.child.map(|idx| idx + first),
+                moves: joint.moves.map(|moves| PartJoint {
+                    axis: (at.rotation * Vector3::from(moves.axis)).into(),
+                    anchor_m: (at * Point3::from(moves.anchor_m)).coords.into(),
+                    ..moves
+                }),
+                to_world: joint.to_world,
+            }));
+    }
+
+    /// Reads a joint of a model that can move. Reports W035 if it does not connect links.
+    fn read_joint(&self, joint: &Written, reader: &mut Reader) -> Option<Joint> {
+        let node = joint.node;
+        sdf_joint::JOINT.check(node, reader);
+        let name = node.attribute("name").unwrap_or_default();
+        let (parent, child) = (
+            self.end(joint, "parent", reader),
+            self.end(joint, "child", reader),
+        );
+        let (parent, child) = (parent?, child?);
+        let to_world = parent == End::World || child == End::World;
+        let is_rigid = sdf_joint::is_rigid(node);
+        let moves = if is_rigid {
+            None
+        } else {
+            let usual = match child {
+                End::Link(idx) => self.frame_of_child(joint, idx, reader),
+                End::World => Some(joint.model),
+            };
+            let moves = sdf_joint::read(node, &usual?, &joint.model, reader)?;
+            if to_world {
+                let message = format!("the joint `{name}` moves the whole model against the world");
+                let help = "connect links of the model itself, or make the joint `fixed`";
+                reader.error("W035", node, message, help);
+                return None;
+            }
+            Some(moves)
+        };
+        Some(Joint {
+            name: format!("{}{name}", joint.prefix),
+            at: xml::span(node),
+            parent: parent.link(),
+            child: child.link(),
+            moves,
+            to_world,
+        })
+    }
+
+    /// Returns the frame in which the pose of a joint is: that of its child.
+    fn frame_of_child(
+        &self,
+        joint: &Written,
+        link: usize,
+        reader: &mut Reader,
+    ) -> Option<Isometry3<f64>> {
+        let named = xml::text(xml::child(joint.node, "child")?);
+        let carrier = sdf_pose::carrier(joint.node, named, reader);
+        if carrier.is_none_or(|carrier| carrier == named) {
+            return Some(self.links[link].pose);
+        }
+        Some(joint.model * sdf_pose::frame(joint.node, named, reader)?)
+    }
+
+    /// Returns the link that an end of a joint names, itself or by a frame. Reports W035, and
+    /// returns `None`, if there is no such link.
+    fn end(&self, joint: &Written, which: &str, reader: &mut Reader) -> Option<End> {
+        let element = reader.required(joint.node, which)?;
+        let named = xml::text(element);
+        let position = |name: &str| self.links.iter().position(|link| link.name == name);
+        let carried = sdf_pose::carrier(joint.node, named, reader)
+            .and_then(|link| position(&format!("{}{link}", joint.prefix)));
+        if let Some(idx) = carried {
+            return Some(End::Link(idx));
+        }
+        if named == "world" {
+            return Some(End::World);
+        }
+        // Early versions name links without, or with other, names of models.
+        let last = |name: &str| name.rsplit("::").next().unwrap_or(name).to_owned();
+        let mut alike =
+            (0..self.links.len()).filter(|idx| last(&self.links[*idx].name) == last(named));
+        if let (Some(idx), None) = (alike.next(), alike.next()) {
+            return Some(End::Link(idx));
+        }
+        let name = joint.node.attribute("name").unwrap_or_default();
+        let message = format!(
+            "the joint `{name}` does not connect two links of this model: there is no `{named}`"
+        );
+        let help = "connect links of the model itself, or make the joint `fixed`";
+        reader.error("W035", element, message, help);
+        None
+    }
+
+    /// Returns the bodies that the links form: one, with those that joints move. Nothing moves in a
+    /// model that is fixed, and after a fault. Reports links that no joint connects to the others
+    /// (W035).
+    pub(crate) fn into_body(self, role: Role, reader: &mut Reader) -> Body {
+        let fixed = self.fixed || self.joints.iter().any(Joint::anchors);
+        let joins: Vec<Join> = {
+            let joints = self.joints.iter();
+            joints.filter_map(|joint| joint.join(reader)).collect()
+        };
+        let joins = if self.fixed { Vec::new() } else { joins };
+        let assembly = Assembly::of(self.links.len(), &joins, &mut reader.found);
+        if !fixed && !self.has_faulty_joint {
+            self.check_connected(&joins, reader);
+        }
+        let names: Vec<String> = self
+            .links
+            .iter()
+            .map(|link| last_name(&link.name))
+            .collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let mut bodies = assembly.empty_bodies(fixed);
+        for (idx, link) in self.links.into_iter().enumerate() {
+            let body = &mut bodies[assembly.body_of(idx)];
+            let material = Surface {
+                friction: link.body.friction,
+                restitution: link.body.restitution,
+            };
+            material.check(body, link.at, role, reader);
+            body.add(link.body);
+        }
+        for body in &bodies {
+            warn_of_usual_friction(body, self.at.clone(), reader);
+        }
+        let body = assembly.attach(bodies, &names, &mut reader.found);
+        refuse_self_collision(&body, self.collides, reader);
+        body
+    }
+
+    /// Checks that joints connect all links of a model that can move (W035).
+    fn check_connected(&self, joins: &[Join], reader: &mut Reader) {
+        let mut reached = BTreeSet::from([0]);
+        let mut is_new = true;
+        while is_new {
+            is_new = false;
+            for join in joins {
+                if reached.contains(&join.parent) != reached.contains(&join.child) {
+                    reached.extend([join.parent, join.child]);
+                    is_new = true;
+                }
+            }
+        }
+        let loose = self.links.iter().enumerate();
+        if let Some((_, link)) = loose.into_iter().find(|(idx, _)| !reached.contains(idx)) {
+            let message = format!("no joint connects `{}` to the other links", link.name);
+            let help = "add a `<joint type=\"fixed\">`, or write `<static>true</static>`";
+            reader.error_at("W035", link.at.clone(), message, help);
+        }
+    }
+}
+
+/// An end of a joint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum End {
+    /// A link, by its index.
+    Link(usize),
+    World,
+}
+
+impl End {
+    fn link(self) -> Option<usize> {
+        match self {
+            Self::Link(idx) => Some(idx),
+            Self::World => None,
+        }
+    }
+}
+
+impl Joint {
+    /// Whether it ties the model to the world.
+    fn anchors(&self) -> bool {
+        self.to_world && self.moves.is_none()
+    }
+
+    fn join(&self, reader: &Reader) -> Option<Join> {
+        Some(Join {
+            place: reader.located(self.at.clone()),
+            parent: self.parent?,
+            child: self.child?,
+            joint: self.moves,
+        })
+    }
+}
+
+/// The last part of a link's name.
+fn last_name(name: &str) -> String {
+    name.rsplit("::").next().unwrap_or(name).to_owned()
+}
+
+/// Warns of a joint that does not move in a world.
+fn warn_of_motion(joint: Node, role: Role, reader: &mut Reader) {
+    if role == Role::Furniture && joint.attribute("type") != Some("fixed") {
+        let name = joint.attribute("name").unwrap_or_default();
+        let message = format!("the joint `{name}` does not move in a world here");
+        reader.warning("W036", joint, message, "it stays as in the file");
+    }
+}
+
+impl<'a> Elements<'a> {
+    /// Reads all models that a model includes, so that their frames are known.
+    fn include_all(
+        &mut self,
+        model: Node<'a>,
+        (role, fixed): (Role, bool),
+        shapes: &mut Shapes,
+        reader: &mut Reader,
+    ) {
+        for child in model.children() {
             match child.tag_name().name() {
-                "link" => self.links.push((child, *at)),
-                "joint" => self.joints.push((child, *at)),
-                "include" => self.includes.push((child, *at)),
-                "model" => {
-                    if let Some(nested) = pose(child, reader) {
-                        self.collect(child, &(at * nested), role, reader);
+                "model" => self.include_all(child, (role, fixed), shapes, reader),
+                "include" => {
+                    if let Some(included) = include(child, (role, fixed), shapes, reader) {
+                        self.models.insert(child.range().start, included);
                     }
-                }
-                "gripper" if role == Role::Object => {
-                    let message = "`<gripper>` inside a model is not supported".to_owned();
-                    reader.error(
-                        "W035",
-                        child,
-                        message,
-                        "leave it out; robots are read from URDF",
-                    );
-                }
-                "plugin" => {
-                    reader.warning(
-                        "W036",
-                        child,
-                        "the plugin is not run".to_owned(),
-                        "the model works without it",
-                    );
                 }
                 _ => {}
             }
         }
     }
 
-    /// Returns the bodies that the links form. Nothing moves in furniture of a world and in a
-    /// static model. After a fault, all links are one body.
-    pub(crate) fn assembly(&self, role: Role, fixed: bool, reader: &mut Reader) -> Assembly {
-        let mut joins = Vec::new();
-        for (joint, at) in &self.joints {
-            let is_fixed = joint.attribute("type") == Some("fixed");
-            if role == Role::Furniture && !is_fixed {
-                let name = joint.attribute("name").unwrap_or("");
-                let message = format!("the joint `{name}` does not move in a world here");
-                reader.warning("W036", *joint, message, "it stays as in the file");
-            }
-            if role == Role::Object && !fixed {
-                joins.extend(self.join(*joint, is_fixed, at, reader));
-            }
-        }
-        Assembly::of(self.links.len(), &joins, &mut reader.found)
-    }
-
-    /// Returns whether a joint that does not move ties the model to the world.
-    pub(crate) fn is_anchored(&self) -> bool {
-        let to_world = |joint: &Node| xml::child(*joint, "parent").map(xml::text) == Some("world");
-        self.joints
-            .iter()
-            .any(|(joint, _)| to_world(joint) && sdf_joint::is_rigid(*joint))
-    }
-
-    /// Reads a joint of a model at a pose. Returns `None` if it does not connect links, after it
-    /// has reported a fault.
-    fn join(
-        &self,
-        joint: Node<'a>,
-        is_fixed: bool,
-        model: &Isometry3<f64>,
-        reader: &mut Reader,
-    ) -> Option<Join> {
-        let (parent, child) = (
-            self.end(joint, "parent", reader),
-            self.end(joint, "child", reader),
-        );
-        if is_fixed || sdf_joint::is_rigid(joint) {
-            // Included models, and the world, are part of the object itself.
-            return Some(Join {
-                place: reader.place(joint),
-                parent: parent?,
-                child: child?,
-                joint: None,
-            });
-        }
-        let at = match child {
-            Some(child) => self.links[child].1 * pose(self.links[child].0, reader)?,
-            None => *model,
-        };
-        let moves = sdf_joint::read(joint, &at, model, reader)?;
-        let (Some(parent), Some(child)) = (parent, child) else {
-            let name = joint.attribute("name").unwrap_or("");
-            let message = match xml::child(joint, "parent").map(xml::text) {
-                Some("world") => {
-                    format!("the joint `{name}` moves the whole model against the world")
-                }
-                _ => format!("the joint `{name}` does not connect two links of this model"),
-            };
-            reader.error(
-                "W035",
-                joint,
-                message,
-                "connect links of the model itself, or make the joint `fixed`",
-            );
-            return None;
-        };
-        Some(Join {
-            place: reader.place(joint),
-            parent,
-            child,
-            joint: Some(moves),
-        })
-    }
-
-    /// Returns the link at an end of a joint, by its index.
-    fn end(&self, joint: Node, which: &str, reader: &mut Reader) -> Option<usize> {
-        let named = xml::text(reader.required(joint, which)?);
-        let last = named.rsplit("::").next().unwrap_or(named);
-        let is_named = |name: &str| {
-            self.links
-                .iter()
-                .position(|(link, _)| link.attribute("name") == Some(name))
-        };
-        is_named(named).or_else(|| is_named(last))
-    }
-
-    /// Checks that joints connect all links of a model that can move (W035).
-    pub(crate) fn check_connected(&self, fixed: bool, reader: &mut Reader) {
-        let all: Vec<Node> = self
-            .links
-            .iter()
-            .chain(&self.includes)
-            .map(|(node, _)| *node)
-            .collect();
-        if let (Some(loose), false) = (all.get(self.joints.len() + 1), fixed) {
-            let written = ["name", "uri"]
-                .iter()
-                .find_map(|child| xml::child(*loose, child))
-                .map(xml::text);
-            let name = loose.attribute("name").or(written).unwrap_or_default();
-            let message = format!("no joint connects `{name}` to the other links");
-            reader.error(
-                "W035",
-                *loose,
-                message,
-                "add a `<joint type=\"fixed\">`, or write `<static>true</static>`",
-            );
-        }
-    }
-
-    /// Adds the bodies of the included models.
-    pub(crate) fn read_included(
-        &self,
-        role: Role,
-        body: &mut Body,
-        shapes: &mut Shapes,
+    /// Collects the elements of a model and of those nested in it.
+    fn collect(
+        &mut self,
+        model: Node<'a>,
+        at: &Isometry3<f64>,
+        prefix: &str,
+        (role, fixed): (Role, bool),
         reader: &mut Reader,
     ) {
-        for (include, at) in &self.includes {
-            if let Some((included, placed)) = read_include(*include, role, shapes, reader) {
-                add(included, &(at * placed), body);
+        MODEL.check(model, reader);
+        if !fixed && self.collides.is_none() {
+            self.collides = self_collision(model, reader);
+        }
+        for child in model.children().filter(Node::is_element) {
+            let written = |node| Written {
+                node,
+                model: *at,
+                prefix: prefix.to_owned(),
+            };
+            match child.tag_name().name() {
+                "link" => self.links.push(written(child)),
+                "joint" => self.joints.push(written(child)),
+                "include" => self.includes.push(written(child)),
+                "model" => {
+                    if !fixed && is_static(child, reader) {
+                        refuse_static(child, reader);
+                    }
+                    if let Some(nested) = pose(child, reader) {
+                        let prefix = format!("{prefix}{}", sdf_pose::prefix(child, reader));
+                        self.collect(child, &(at * nested), &prefix, (role, fixed), reader);
+                    }
+                }
+                "gripper" if role == Role::Object => {
+                    let message = "`<gripper>` inside a model is not supported".to_owned();
+                    let help = "leave it out; robots are read from URDF";
+                    reader.error("W035", child, message, help);
+                }
+                "plugin" => {
+                    let message = "the plugin is not run".to_owned();
+                    reader.warning("W036", child, message, "the model works without it");
+                }
+                _ => {}
             }
         }
+    }
+
+    /// Whether a joint ties the model to the world, and none of its joints moves.
+    fn stay(&self) -> bool {
+        let to_world = |joint: &Written| {
+            let name = |end| xml::child(joint.node, end).map(xml::text);
+            [name("parent"), name("child")].contains(&Some("world"))
+        };
+        self.joints.iter().any(to_world)
+            && self
+                .joints
+                .iter()
+                .all(|joint| sdf_joint::is_rigid(joint.node))
     }
 }
 
-/// Reads the model that an `<include>` names, and its pose in the frame of the parent. Returns
-/// `None` after it has reported a fault.
-fn read_include(
+/// Returns the place of a switch of a model, or of one of its links, that makes links collide with
+/// each other.
+fn self_collision(model: Node, reader: &mut Reader) -> Option<Span> {
+    let places = std::iter::once(model).chain(xml::children(model, "link"));
+    places
+        .filter_map(|place| xml::child(place, "self_collide"))
+        .find(|switch| reader.boolean(*switch) == Some(true))
+        .map(xml::span)
+}
+
+fn refuse_static(model: Node, reader: &mut Reader) {
+    let message = "a static model inside one that can move can't be simulated".to_owned();
+    let help = "remove its `<static>`, or make the whole model static";
+    let node = xml::child(model, "static").unwrap_or(model);
+    reader.error("W035", node, message, help);
+}
+
+/// Reads the model that an `<include>` in a model names. Returns `None` after it has reported a
+/// fault.
+fn include(
     include: Node,
-    role: Role,
+    (role, fixed): (Role, bool),
     shapes: &mut Shapes,
     reader: &mut Reader,
-) -> Option<(Body, Isometry3<f64>)> {
-    reader.warn_about_unknown_children(
-        include,
-        &["uri", "name", "pose", "static", "plugin", "placement_frame"],
-    );
+) -> Option<SubModel> {
+    check_include(include, reader);
     let uri = reader.required(include, "uri")?;
     if shapes.depth >= DEEPEST {
         let message =
@@ -242,58 +571,39 @@ fn read_include(
         reader.error("W035", uri, message, "remove the `<include>`");
         return None;
     }
-    let model = folder::included(
-        uri,
-        shapes.lookup,
-        role,
-        shapes.depth + 1,
-        std::iter::empty(),
-        reader,
-    )?;
-    shapes.digest.update(model.digest.as_bytes());
-    let own = if xml::child(include, "pose").is_some() {
-        pose(include, reader)?
-    } else {
-        model.pose
+    let merged = reader.boolean_attribute(include, "merge")?;
+    let depth = shapes.depth + 1;
+    let known = std::iter::empty();
+    let mut model = folder::included(uri, shapes.lookup, (role, fixed), depth, known, reader)?;
+    // A merged model leaves `<static>` to the model that includes it.
+    let is_static = match xml::child(include, "static") {
+        Some(written) => reader.boolean(written)?,
+        None => model.is_static && !merged,
     };
-    Some((model.body, own))
+    if is_static && !fixed {
+        refuse_static(include, reader);
+        return None;
+    }
+    model.place.merged = merged;
+    register(include, &model.place, reader);
+    Some(model)
 }
 
-/// Adds a body at a pose to another one.
-fn add(other: Body, at: &Isometry3<f64>, body: &mut Body) {
-    let turn = at.rotation.to_rotation_matrix();
-    body.parts.extend(other.parts.into_iter().map(|part| Part {
-        pose: Pose::from_isometry(&(at * part.pose.to_isometry())),
-        shape: part.shape,
-    }));
-    body.masses.extend(other.masses.into_iter().map(|mass| {
-        Mass {
-            kg: mass.kg,
-            com: (at * Point3::from(mass.com)).coords,
-            about_com: mass
-                .about_com
-                .map(|moments| turn.matrix() * moments * turn.matrix().transpose()),
-        }
-    }));
-    let joint = |joint: PartJoint| PartJoint {
-        axis: (at.rotation * Vector3::from(joint.axis)).into(),
-        anchor_m: (at * Point3::from(joint.anchor_m)).coords.into(),
-        ..joint
-    };
-    let first = body.moving.len();
-    for moved in other.moving {
-        let mut part = Body::default();
-        add(moved.body, at, &mut part);
-        let (on, joint) = (moved.on.map(|on| on + first), joint(moved.joint));
-        let name = free_name(&moved.name, &body.moving);
-        body.moving.push(MovingBody {
-            name,
-            body: part,
-            on,
-            joint,
-        });
+/// Reports the elements of an `<include>` that are not read.
+pub(crate) fn check_include(include: Node, reader: &mut Reader) {
+    INCLUDE.check(include, reader);
+    if let Some(params) = prefixed(include, "experimental", "params") {
+        let message = "changes of an included model can't be read".to_owned();
+        let help = "write the changed model to a folder of its own";
+        reader.error("W035", params, message, help);
     }
-    body.has_unknown_mass |= other.has_unknown_mass;
-    body.friction = body.friction.or(other.friction);
-    body.restitution = body.restitution.or(other.restitution);
+}
+
+/// Makes the frames of an included model known to the elements of the file that includes it.
+pub(crate) fn register(include: Node, place: &Included, reader: &mut Reader) {
+    let mut place = place.clone();
+    if let Some(name) = xml::child(include, "name") {
+        xml::text(name).clone_into(&mut place.name);
+    }
+    reader.included.insert(include.range().start, place);
 }

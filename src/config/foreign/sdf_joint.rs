@@ -2,6 +2,7 @@
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
+use crate::foreign::elements::{Children, refuse_unless};
 use crate::foreign::sdf_pose::{frame, pose};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_data::PartJoint;
@@ -12,11 +13,59 @@ const UNLIMITED: f64 = 1e6;
 /// the model.
 const OWN_FRAME: u32 = 5;
 
-/// Reads a joint that moves a link at a pose in a model at a pose. Reports W033 to W035, and
+pub(crate) const JOINT: Children = Children {
+    read: &["parent", "child", "pose", "axis", "axis2", "origin"],
+    // The limits and damping in `<physics>` are those of other solvers, with their own defaults.
+    harmless: &[
+        "sensor",
+        "physics",
+        "gearbox_ratio",
+        "gearbox_reference_body",
+        "thread_pitch",
+        "screw_thread_pitch",
+    ],
+    refused: &[],
+};
+const AXIS: Children = Children {
+    read: &[
+        "xyz",
+        "use_parent_model_frame",
+        "limit",
+        "dynamics",
+        "initial_position",
+    ],
+    harmless: &[],
+    refused: &["mimic"],
+};
+const DYNAMICS: Children = Children {
+    read: &[
+        "damping",
+        "friction",
+        "spring_reference",
+        "spring_stiffness",
+    ],
+    harmless: &[],
+    refused: &[],
+};
+/// There is no motor whose effort and speed could have limits.
+const LIMIT: Children = Children {
+    read: &[
+        "lower",
+        "upper",
+        "effort",
+        "velocity",
+        "stiffness",
+        "dissipation",
+    ],
+    harmless: &[],
+    refused: &[],
+};
+
+/// Reads a joint of a model at a pose, whose own pose is relative to the frame `child`. Reports W033 to W035, and
 /// returns `None`, if it can't be simulated.
 pub(crate) fn read(
     joint: Node,
-    link: &Isometry3<f64>,
+    child: &Isometry3<f64>,
     model: &Isometry3<f64>,
     reader: &mut Reader,
 ) -> Option<PartJoint> {
@@ -32,8 +81,11 @@ pub(crate) fn read(
         );
         return None;
     }
-    let at = link * pose(joint, reader)?;
+    let at = child * pose(joint, reader)?;
     let axis = reader.required(joint, "axis")?;
+    AXIS.check(axis, reader);
+    let why = "a joint begins at 0";
+    refuse_unless(axis, "initial_position", 0.0, why, reader);
     let own = model.rotation.inverse() * at.rotation;
     let direction = direction(joint, axis, own, reader)?;
     let Some(direction) = (model.rotation * direction).try_normalize(1e-9) else {
@@ -47,6 +99,9 @@ pub(crate) fn read(
         return None;
     };
     let limits = xml::child(axis, "limit").filter(|_| kind != "continuous");
+    if let Some(limits) = limits {
+        LIMIT.check(limits, reader);
+    }
     let mut limit =
         |name: &str, otherwise: f64| match limits.and_then(|limits| xml::child(limits, name)) {
             Some(node) => reader.number(node, Bound::Finite).map(|value| {
@@ -77,11 +132,10 @@ pub(crate) fn read(
         None => Some(0.0),
     };
     let (damping, friction) = (resistance("damping")?, resistance("friction")?);
-    if let Some(spring) = dynamics.and_then(|dynamics| xml::child(dynamics, "spring_stiffness"))
-        && reader.number(spring, Bound::Finite)? != 0.0
-    {
-        let message = format!("the spring of the joint `{name}` is ignored");
-        reader.warning("W036", spring, message, "the part moves without it");
+    if let Some(dynamics) = dynamics {
+        DYNAMICS.check(dynamics, reader);
+        let why = "joints have no springs";
+        refuse_unless(dynamics, "spring_stiffness", 0.0, why, reader);
     }
     let anchor_m = at.translation.vector.into();
     Some(PartJoint {

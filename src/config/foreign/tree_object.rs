@@ -5,9 +5,8 @@ use std::collections::BTreeMap;
 use nalgebra::Isometry3;
 
 use crate::foreign::assembly::{Assembly, Join};
-use crate::foreign::body::{Body, Mass, is_possible};
+use crate::foreign::body::{Body, Mass, SdfModel, is_possible};
 use crate::foreign::geometry::{Shapes, report_volume};
-use crate::foreign::sdf::SdfModel;
 use crate::foreign::xml;
 use actcheck_base::{Diagnostic, Diagnostics, SourceSpan};
 use actcheck_data::{

@@ -5,11 +5,13 @@ use std::path::Path;
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use crate::foreign::assembly::{Assembly, Join};
-use crate::foreign::body::{Body, Mass};
+use crate::foreign::body::{Body, Mass, Role, SdfModel};
 use crate::foreign::geometry::{Shapes, check_volume};
 use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
-use crate::foreign::sdf::{SdfModel, possible};
+use crate::foreign::sdf_inertial::possible;
+use crate::foreign::sdf_surface::{refuse_self_collision, warn_of_usual_friction};
+use crate::foreign::urdf_extra::{self, Extras};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostics, Source};
 use actcheck_data::{Part, PartJoint, Pose};
@@ -59,9 +61,9 @@ pub(crate) fn read(
     let digest = shapes.digest.finish();
     (
         Some(SdfModel {
+            is_static: body.fixed,
             body,
             pose: Isometry3::identity(),
-            is_static: false,
             digest,
         }),
         found,
@@ -69,7 +71,8 @@ pub(crate) fn read(
 }
 
 fn read_robot(root: Node, shapes: &mut Shapes, reader: &mut Reader) -> Body {
-    reader.warn_about_unknown_children(root, &["link", "joint", "material"]);
+    urdf_extra::ROBOT.check(root, reader);
+    let extras = Extras::of(root, reader);
     let joints: Vec<Node> = xml::children(root, "joint").collect();
     let links: Vec<Node> = xml::children(root, "link").collect();
     let places: Vec<Option<Isometry3<f64>>> = links
@@ -101,11 +104,11 @@ fn read_robot(root: Node, shapes: &mut Shapes, reader: &mut Reader) -> Body {
         });
     }
     let assembly = Assembly::of(links.len(), &joins, &mut reader.found);
-    let mut bodies = assembly.empty_bodies(false);
+    let mut bodies = assembly.empty_bodies(extras.is_static);
     for (idx, (link, at)) in links.iter().zip(&places).enumerate() {
         if let Some(at) = at {
             read_link(
-                (*link, at),
+                (*link, at, &extras),
                 &mut bodies[assembly.body_of(idx)],
                 shapes,
                 reader,
@@ -116,7 +119,12 @@ fn read_robot(root: Node, shapes: &mut Shapes, reader: &mut Reader) -> Body {
         .iter()
         .map(|link| link.attribute("name").unwrap_or_default())
         .collect();
-    assembly.attach(bodies, &names, &mut reader.found)
+    for body in &bodies {
+        warn_of_usual_friction(body, xml::span(root), reader);
+    }
+    let body = assembly.attach(bodies, &names, &mut reader.found);
+    refuse_self_collision(&body, extras.collides, reader);
+    body
 }
 
 /// Reads a joint that moves a link, whose pose is known. Returns `None` after it has reported a
@@ -134,6 +142,7 @@ fn read_joint(joint: Node, at: &Isometry3<f64>, reader: &mut Reader) -> Option<P
         );
         return None;
     }
+    urdf_extra::JOINT.check(joint, reader);
     let mut numbers = |element: &str, attribute: &str, otherwise: f64| {
         let written =
             xml::child(joint, element).and_then(|node| Some((node, node.attribute(attribute)?)));
@@ -230,14 +239,18 @@ pub(crate) fn origin(node: Node, reader: &mut Reader) -> Option<Isometry3<f64>> 
 }
 
 fn read_link(
-    (link, at): (Node, &Isometry3<f64>),
+    (link, at, extras): (Node, &Isometry3<f64>, &Extras),
     body: &mut Body,
     shapes: &mut Shapes,
     reader: &mut Reader,
 ) {
-    reader.warn_about_unknown_children(link, &["inertial", "collision", "visual"]);
+    urdf_extra::LINK.check(link, reader);
     let before = body.parts.len();
+    let contact = extras.of_link(link, reader);
     for collision in xml::children(link, "collision") {
+        urdf_extra::COLLISION.check(collision, reader);
+        let surface = contact.of_collision(collision, reader);
+        surface.add_to(body, collision, Role::Object, reader);
         let placed = origin(collision, reader);
         let shape = reader
             .required(collision, "geometry")
@@ -254,13 +267,14 @@ fn read_link(
     if let Some(mass) =
         xml::child(link, "inertial").and_then(|inertial| read_inertial(inertial, at, reader))
     {
-        body.masses.push(mass);
+        body.masses.push(contact.with_inertia(mass, link, reader));
         return;
     }
     body.has_unknown_mass |= body.parts.len() > before;
 }
 
 fn read_inertial(inertial: Node, link: &Isometry3<f64>, reader: &mut Reader) -> Option<Mass> {
+    urdf_extra::INERTIAL.check(inertial, reader);
     let at = link * origin(inertial, reader)?;
     let mass = reader.required(inertial, "mass")?;
     let written = reader.attribute(mass, "value")?;

@@ -7,40 +7,51 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
-use crate::foreign::body::Body;
+use crate::foreign::body::{Body, Role};
 use crate::foreign::building::{self, Solid, Split};
+use crate::foreign::elements::Children;
 use crate::foreign::geometry::Shapes;
 use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
-use crate::foreign::nested::Role;
+use crate::foreign::nested::{SubModel, Tree, check_include, register};
 use crate::foreign::sdf::check_version;
 use crate::foreign::sdf_pose::pose;
-use crate::foreign::xml::{self, Node, Reader};
+use crate::foreign::world_state::{ModelState, WorldState};
+use crate::foreign::xml::{self, Bound, Node, Reader};
 use crate::foreign::{folder, fronts, mjcf_world, sdf, tree_object};
 use crate::{Furniture, WorldMap};
 use actcheck_base::{Diagnostics, Severity, Source, Span, digest_of};
 use actcheck_data::{FLOOR_M, ObjectModel, Pose};
 
-/// Elements of a world that are read, or that do not affect its geometry: light, Gazebo's display
-/// and time steps.
-const KNOWN: [&str; 16] = [
-    "include",
-    "model",
-    "light",
-    "scene",
-    "gui",
-    "physics",
-    "gravity",
-    "magnetic_field",
-    "atmosphere",
-    "wind",
-    "state",
-    "spherical_coordinates",
-    "audio",
-    "plugin",
-    "road",
-    "name",
-];
+/// Light, display and time steps do not affect a world; in Gazebo, too, roads and actors do not
+/// collide. Joints have no effect where nothing moves.
+const WORLD: Children = Children {
+    read: &[
+        "include",
+        "model",
+        "frame",
+        "state",
+        "gravity",
+        "light",
+        "scene",
+        "gui",
+        "physics",
+        "magnetic_field",
+        "atmosphere",
+        "wind",
+        "spherical_coordinates",
+        "audio",
+        "plugin",
+        "road",
+        "name",
+    ],
+    harmless: &["actor", "joint"],
+    refused: &["population"],
+};
+/// Acceleration by gravity in the simulation. Unit: m/s².
+const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
+/// Files round gravity, and it differs between places on Earth. Unit: m/s².
+const GRAVITY_TOLERANCE: f64 = 0.1;
 /// Included models to skip: every world already has a floor and light.
 const ALWAYS_THERE: [&str; 2] = ["ground_plane", "sun"];
 /// A model that is tilted by more than this gets a model of its own. Unit: cosine.
@@ -102,6 +113,7 @@ pub(crate) fn read(
         world,
         pieces: Vec::new(),
         whole: Vec::new(),
+        links: BTreeMap::new(),
         reader: Reader::new(source),
     };
     let root = document.root_element();
@@ -110,17 +122,7 @@ pub(crate) fn read(
     } else if check_version(root, &mut gathering.reader).is_some()
         && let Some(world) = gathering.reader.required(root, "world")
     {
-        gathering.reader.warn_about_unknown_children(world, &KNOWN);
-        for child in world.children().filter(Node::is_element) {
-            let piece = match child.tag_name().name() {
-                "model" => gathering.inline(child),
-                "include" => gathering.include(child),
-                _ => None,
-            };
-            gathering
-                .pieces
-                .extend(piece.map(|piece| (piece, xml::span(child))));
-        }
+        gathering.models(world);
     }
     gathering.add_all();
     gathering.add_fronts();
@@ -139,10 +141,82 @@ struct WorldReader<'a> {
     pieces: Vec<(Furniture, Span)>,
     /// Furniture other than the solids of buildings: its index, and its element in the text.
     whole: Vec<(usize, Span)>,
+    /// Poses of the links of included models, each in the frame of its model, by the URIs.
+    links: BTreeMap<String, BTreeMap<String, Isometry3<f64>>>,
     reader: Reader<'a>,
 }
 
 impl WorldReader<'_> {
+    /// Reads the models of a world in SDF, as its `<state>` leaves them.
+    fn models(&mut self, world: Node) {
+        WORLD.check(world, &mut self.reader);
+        check_gravity(world, &mut self.reader);
+        let mut state = WorldState::of(world, &mut self.reader);
+        let unusable = self.register_frames(world);
+        let inserted = std::mem::take(&mut state.inserted);
+        let mut known = BTreeSet::new();
+        for child in world.children().filter(Node::is_element).chain(inserted) {
+            let is_inline = match child.tag_name().name() {
+                "model" => true,
+                "include" => false,
+                _ => continue,
+            };
+            let name = if is_inline {
+                child.attribute("name").unwrap_or_default().to_owned()
+            } else {
+                name_of_include(child)
+            };
+            let moved = state.take(&name);
+            let is_there = !state.deleted.contains(&name);
+            known.insert(name);
+            if !is_there || unusable.contains(&child.range().start) {
+                continue;
+            }
+            let piece = match is_inline {
+                true => self.inline(child, moved),
+                false => self.include(child, moved),
+            };
+            self.pieces
+                .extend(piece.map(|piece| (piece, xml::span(child))));
+        }
+        state.warn_of_others(&known, &mut self.reader);
+    }
+
+    /// Reads the frames of those included models that elements of the world name. Returns the
+    /// offsets of each `<include>` whose model has a fault, which is reported.
+    fn register_frames(&mut self, world: Node) -> BTreeSet<usize> {
+        let mut unusable = BTreeSet::new();
+        let named: BTreeSet<&str> = world
+            .descendants()
+            .flat_map(|node| ["relative_to", "frame", "attached_to"].map(|key| node.attribute(key)))
+            .flatten()
+            .collect();
+        for include in xml::children(world, "include") {
+            let name = name_of_include(include);
+            let inside = format!("{name}::");
+            let is_named = |frame: &&str| **frame == *name || frame.starts_with(&inside);
+            let is_placed = xml::child(include, "placement_frame").is_some();
+            if !is_placed && !named.iter().any(is_named) {
+                continue;
+            }
+            let Some(uri) = xml::child(include, "uri").filter(|uri| !is_always_there(*uri)) else {
+                continue;
+            };
+            match self.included(uri) {
+                Some(model) => register(include, &model.place, &mut self.reader),
+                None => _ = unusable.insert(include.range().start),
+            }
+        }
+        unusable
+    }
+
+    /// Reads an included model as it is in a world. Returns `None` after it has reported a fault.
+    fn included(&mut self, uri: Node) -> Option<SubModel> {
+        let known = self.included.models.keys().map(String::as_str);
+        let role = (Role::Furniture, true);
+        folder::included(uri, self.included.lookup, role, 1, known, &mut self.reader)
+    }
+
     /// Adds all models. If slabs are the floor of the world, everything is moved down until their
     /// tops are at height 0.
     fn add_all(&mut self) {
@@ -362,15 +436,23 @@ impl WorldReader<'_> {
 
     /// Reads a model that is defined inside the world. A model without solid shapes but planes is
     /// left out: every world has a floor, and lights and pictures do not collide.
-    fn inline(&mut self, model: Node) -> Option<Furniture> {
+    fn inline(&mut self, model: Node, state: Option<ModelState>) -> Option<Furniture> {
         let name = self.reader.attribute(model, "name")?;
         let mut shapes = Shapes::new(self.included.lookup, self.path);
         shapes
             .digest
             .update(self.reader.source.text[model.range()].as_bytes());
         let n_faults = self.reader.found.len();
-        let body = sdf::read_model(model, Role::Furniture, &mut shapes, &mut self.reader);
-        let at = pose(model, &mut self.reader)?;
+        let role = Role::Furniture;
+        let mut tree = Tree::read(model, role, true, &mut shapes, &mut self.reader);
+        if let Some(state) = &state {
+            state.apply(&mut tree, &mut self.reader);
+        }
+        let body = tree.into_body(role, &mut self.reader);
+        let at = match state {
+            Some(state) => state.pose,
+            None => pose(model, &mut self.reader)?,
+        };
         let is_faulty = self
             .reader
             .found
@@ -385,49 +467,77 @@ impl WorldReader<'_> {
         Some(self.place(body, shapes.digest.finish(), &at, name))
     }
 
-    fn include(&mut self, include: Node) -> Option<Furniture> {
-        let known = ["uri", "name", "pose", "static", "plugin", "placement_frame"];
-        self.reader.warn_about_unknown_children(include, &known);
-        let uri = self.reader.required(include, "uri")?;
-        let named = folder::name_in(xml::text(uri));
-        if ALWAYS_THERE.contains(&named.to_lowercase().replace(' ', "_").as_str()) {
+    fn include(&mut self, include: Node, state: Option<ModelState>) -> Option<Furniture> {
+        check_include(include, &mut self.reader);
+        if self.reader.boolean_attribute(include, "merge") != Some(false) {
+            let message = "a world that is merged into another one can't be read".to_owned();
+            let help = "write its models here, or include a model without `merge`";
+            self.reader.error("W035", include, message, help);
             return None;
         }
-        let at = pose(include, &mut self.reader)?;
-        let name = xml::child(include, "name").map_or(named.as_str(), xml::text);
+        let uri = self.reader.required(include, "uri")?;
+        let named = folder::name_in(xml::text(uri));
+        if is_always_there(uri) {
+            return None;
+        }
+        let name = name_of_include(include);
         let is_still = sdf::is_static(include, &mut self.reader);
-        let is_upright = (at.rotation * Vector3::z()).z >= UPRIGHT_COSINE;
-        let has_pose = xml::child(include, "pose").is_some();
-        let moves = |model: &ObjectModel| !is_still && !model.moving.is_empty();
-        if let Some(model) = self.included.models.get(&named)
-            && is_upright
-            && !self.included.posed.contains(&named)
-            && (model.moving.is_empty() || moves(model))
+        let at = match &state {
+            Some(state) => state.pose,
+            None => pose(include, &mut self.reader)?,
+        };
+        if let Some(model) = self.shared(uri, &named, &at, state.as_ref())
+            && (model.moving.is_empty() || !is_still)
         {
+            let foot = at * Point3::from(model.origin_m.map(|x| -x));
             self.warn_if_movable(is_still || model.fixed, &named, include);
             // A model's origin is below its middle; the file's origin may differ.
-            let foot = at * Point3::from(model.origin_m.map(|x| -x));
             return Some(Furniture {
-                name: name.to_owned(),
+                name,
                 model: named.clone(),
                 pose: upright(&at, foot),
             });
         }
-        let known = self.included.models.keys().map(String::as_str);
-        let model = folder::included(
-            uri,
-            self.included.lookup,
-            Role::Furniture,
-            1,
-            known,
-            &mut self.reader,
-        )?;
-        if model.body.parts.is_empty() {
+        let mut model = self.included(uri)?;
+        if let Some(state) = &state {
+            state.apply(&mut model.tree, &mut self.reader);
+        }
+        register(include, &model.place, &mut self.reader);
+        let body = model.tree.into_body(Role::Furniture, &mut self.reader);
+        let at = match state {
+            Some(state) => state.pose,
+            None => pose(include, &mut self.reader)?,
+        };
+        if body.parts.is_empty() {
             return None;
         }
         self.warn_if_movable(is_still || model.is_static, &named, include);
-        let at = if has_pose { at } else { model.pose };
-        Some(self.place(model.body, model.digest, &at, name))
+        Some(self.place(body, model.digest, &at, &name))
+    }
+
+    /// Returns the model of the folders that an `<include>` names, unless the world gives it another
+    /// shape or turns it out of the upright at its pose.
+    fn shared(
+        &mut self,
+        uri: Node,
+        named: &str,
+        at: &Isometry3<f64>,
+        state: Option<&ModelState>,
+    ) -> Option<Arc<ObjectModel>> {
+        let model = Arc::clone(self.included.models.get(named)?);
+        let is_upright = (at.rotation * Vector3::z()).z >= UPRIGHT_COSINE;
+        if !is_upright || self.included.posed.contains(named) {
+            return None;
+        }
+        let Some(state) = state else {
+            return Some(model);
+        };
+        if !self.links.contains_key(named) {
+            let links = self.included(uri)?.tree.links.into_iter();
+            let links = links.map(|link| (link.name, link.pose)).collect();
+            self.links.insert(named.to_owned(), links);
+        }
+        state.is_rigid(&self.links[named]).then_some(model)
     }
 
     /// Adds the bodies of a world in MJCF.
@@ -481,6 +591,36 @@ impl WorldReader<'_> {
             let message = format!("`{name}` can move in Gazebo, but is static in a world here");
             let help = "put movable objects into `[surfaceObjects]` or `nav_obstacle_list`";
             self.reader.warning("W036", node, message, help);
+        }
+    }
+}
+
+/// Whether an `<include>` names a model that every world has already.
+fn is_always_there(uri: Node) -> bool {
+    let named = folder::name_in(xml::text(uri));
+    ALWAYS_THERE.contains(&named.to_lowercase().replace(' ', "_").as_str())
+}
+
+/// The name of an included model in the world: its own, or that of its file.
+fn name_of_include(include: Node) -> String {
+    let uri = xml::child(include, "uri").map_or("", xml::text);
+    xml::child(include, "name")
+        .map_or_else(|| folder::name_in(uri), |name| xml::text(name).to_owned())
+}
+
+/// Reports gravity that differs from that of the simulation (W035).
+fn check_gravity(world: Node, reader: &mut Reader) {
+    let places = std::iter::once(world).chain(xml::children(world, "physics"));
+    for node in places.filter_map(|place| xml::child(place, "gravity")) {
+        let Some(written) = reader.numbers::<3>(node, xml::text(node), Bound::Finite) else {
+            continue;
+        };
+        let is_near = |(found, usual): (&f64, &f64)| (found - usual).abs() <= GRAVITY_TOLERANCE;
+        if !written.iter().zip(&GRAVITY).all(is_near) {
+            let [x, y, z] = written;
+            let message = format!("gravity of {x} {y} {z} m/s² can't be simulated");
+            let help = "write `<gravity>0 0 -9.81</gravity>`, or remove it";
+            reader.error("W035", node, message, help);
         }
     }
 }

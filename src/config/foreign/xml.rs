@@ -1,7 +1,10 @@
 //! XML elements with their spans, on top of `roxmltree`.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
+use crate::foreign::frames::Included;
 use actcheck_base::{Diagnostic, Diagnostics, Source, SourceSpan, Span, check_xml, did_you_mean};
 
 /// Longest text of a model, robot or world; meshes have files of their own. Unit: bytes.
@@ -182,6 +185,8 @@ pub(crate) struct Reader<'a> {
     /// The pieces of the text; empty if it is one file.
     pub(crate) pieces: Pieces,
     pub(crate) found: Diagnostics,
+    /// Frames of included models that have been read, by the offset of their `<include>`.
+    pub(crate) included: BTreeMap<usize, Included>,
     n_errors: usize,
     n_warnings: usize,
 }
@@ -192,6 +197,7 @@ impl<'a> Reader<'a> {
             source,
             pieces: Vec::new(),
             found: Diagnostics::new(),
+            included: BTreeMap::new(),
             n_errors: 0,
             n_warnings: 0,
         }
@@ -202,7 +208,8 @@ impl<'a> Reader<'a> {
         self.located(node.range())
     }
 
-    fn located(&self, span: Span) -> SourceSpan {
+    /// Returns a place in the text, in the file that contains it.
+    pub(crate) fn located(&self, span: Span) -> SourceSpan {
         let after = self
             .pieces
             .partition_point(|(start, ..)| *start <= span.start);
@@ -375,19 +382,28 @@ impl<'a> Reader<'a> {
 
     /// Parses a boolean from an element's text; reports W034 and returns `None` if it is invalid.
     pub(crate) fn boolean(&mut self, node: Node) -> Option<bool> {
-        match text(node) {
-            "true" | "1" => Some(true),
-            "false" | "0" => Some(false),
-            other => {
-                let message = format!(
-                    "`<{}>` must be true or false, but this is `{}`",
-                    node.tag_name().name(),
-                    short(other)
-                );
-                self.error("W034", node, message, "write `true` or `false`");
-                None
-            }
+        self.truth(node, node.tag_name().name(), text(node))
+    }
+
+    /// Parses a boolean from an attribute; false if it is missing. Reports W034 and returns `None`
+    /// if it is invalid.
+    pub(crate) fn boolean_attribute(&mut self, node: Node, name: &str) -> Option<bool> {
+        match node.attribute(name) {
+            Some(written) => self.truth(node, name, written.trim()),
+            None => Some(false),
         }
+    }
+
+    fn truth(&mut self, node: Node, name: &str, written: &str) -> Option<bool> {
+        let found = truth(written);
+        if found.is_none() {
+            let message = format!(
+                "`<{name}>` must be true or false, but this is `{}`",
+                short(written)
+            );
+            self.error("W034", node, message, "write `true` or `false`");
+        }
+        found
     }
 
     /// Warns about every child element that is not in `known` (W036).
@@ -408,6 +424,16 @@ impl<'a> Reader<'a> {
                 );
             }
         }
+    }
+}
+
+/// Returns a boolean of XML Schema, in upper or lower case as Gazebo reads it; `None` for other
+/// text.
+pub(crate) fn truth(text: &str) -> Option<bool> {
+    match text.to_ascii_lowercase().as_str() {
+        "true" | "1" => Some(true),
+        "false" | "0" => Some(false),
+        _ => None,
     }
 }
 

@@ -1,0 +1,171 @@
+//! Reads the mass of a link in SDF, or computes it from the link's collisions.
+
+use nalgebra::{Isometry3, Matrix3};
+
+use crate::foreign::body::{Mass, is_possible};
+use crate::foreign::elements::Children;
+use crate::foreign::sdf_pose::pose;
+use crate::foreign::solids::SolidMass;
+use crate::foreign::xml::{self, Bound, Node, Reader};
+use actcheck_data::Shape;
+
+/// Density where none is stated, in SDF: that of water. Unit: kg/m³.
+const DENSITY: f64 = 1000.0;
+const INERTIAL: Children = Children {
+    read: &["mass", "pose", "inertia", "density", "auto_inertia_params"],
+    harmless: &[],
+    refused: &["fluid_added_mass"],
+};
+
+/// A collision of a link: its element, shape and pose.
+pub(crate) struct Solid<'a> {
+    pub(crate) collision: Node<'a>,
+    pub(crate) shape: Shape,
+    pub(crate) at: Isometry3<f64>,
+}
+
+/// Reads the mass of a link from its `<inertial>`, which states it or leaves it to the volumes of
+/// the collisions; `None` if it has none.
+pub(crate) fn read(
+    link: Node,
+    at: &Isometry3<f64>,
+    solids: &[Solid],
+    reader: &mut Reader,
+) -> Option<Mass> {
+    let inertial = xml::child(link, "inertial");
+    let is_computed = match inertial {
+        Some(inertial) => reader.boolean_attribute(inertial, "auto")?,
+        None => false,
+    };
+    if !is_computed {
+        warn_of_densities(link, inertial, reader);
+    }
+    let inertial = inertial?;
+    INERTIAL.check(inertial, reader);
+    if is_computed {
+        computed(inertial, solids, reader)
+    } else {
+        stated(inertial, at, reader)
+    }
+}
+
+/// Warns of densities in a link whose mass is not computed from them.
+fn warn_of_densities(link: Node, inertial: Option<Node>, reader: &mut Reader) {
+    let density = xml::children(link, "collision")
+        .chain(inertial)
+        .find_map(|node| xml::child(node, "density"));
+    if let Some(density) = density {
+        let message = "`<density>` has no effect: the mass is not computed from it".to_owned();
+        let help = "write `<inertial auto=\"true\">`";
+        reader.warning("W036", density, message, help);
+    }
+}
+
+fn stated(inertial: Node, link: &Isometry3<f64>, reader: &mut Reader) -> Option<Mass> {
+    let at = link * pose(inertial, reader)?;
+    let kg = reader.number(xml::child(inertial, "mass")?, Bound::Positive)?;
+    let moments = xml::child(inertial, "inertia").and_then(|inertia| read_inertia(inertia, reader));
+    let turn = at.rotation.to_rotation_matrix();
+    let about_com = moments.map(|moments| turn.matrix() * moments * turn.matrix().transpose());
+    Some(Mass {
+        kg,
+        com: at.translation.vector,
+        about_com,
+    })
+}
+
+fn read_inertia(inertia: Node, reader: &mut Reader) -> Option<Matrix3<f64>> {
+    let mut entry = |name: &str, default| match xml::child(inertia, name) {
+        Some(node) => reader.number(node, Bound::Finite),
+        None => Some(default),
+    };
+    let (xx, yy, zz) = (entry("ixx", 1.0)?, entry("iyy", 1.0)?, entry("izz", 1.0)?);
+    let (xy, xz, yz) = (entry("ixy", 0.0)?, entry("ixz", 0.0)?, entry("iyz", 0.0)?);
+    let moments = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+    possible(moments, inertia, reader)
+}
+
+/// Returns the moments of inertia if they are possible. Otherwise warns (W036) and returns `None`:
+/// they are then computed from the shapes.
+pub(crate) fn possible(
+    moments: Matrix3<f64>,
+    inertia: Node,
+    reader: &mut Reader,
+) -> Option<Matrix3<f64>> {
+    if is_possible(&moments) {
+        return Some(moments);
+    }
+    let message =
+        "these moments of inertia are impossible: they are computed from the shapes instead"
+            .to_owned();
+    reader.warning(
+        "W036",
+        inertia,
+        message,
+        "each principal moment must be above 0 and at most the sum of the other two",
+    );
+    None
+}
+
+/// Computes mass, centre and moments of a link from the volumes and densities of its collisions. A
+/// stated mass scales them, as in libsdformat.
+fn computed(inertial: Node, solids: &[Solid], reader: &mut Reader) -> Option<Mass> {
+    let usual = match xml::child(inertial, "density") {
+        Some(density) => reader.number(density, Bound::Positive)?,
+        None => DENSITY,
+    };
+    let mut masses = Vec::new();
+    for solid in solids {
+        let density = match xml::child(solid.collision, "density") {
+            Some(density) => reader.number(density, Bound::Positive)?,
+            None => usual,
+        };
+        let Some(unit) = of_geometry(solid, reader) else {
+            let message = "the mass of a shape without a volume can't be computed".to_owned();
+            let help = "state the `<mass>` of the link, without `auto`";
+            reader.error("W035", solid.collision, message, help);
+            return None;
+        };
+        masses.push(unit.placed(&solid.at, density));
+    }
+    let Some(whole) = SolidMass::together(&masses) else {
+        let message = "the mass of a link without a `<collision>` can't be computed".to_owned();
+        reader.error(
+            "W033",
+            inertial,
+            message,
+            "add a `<collision>`, or state the `<mass>`",
+        );
+        return None;
+    };
+    let kg = match xml::child(inertial, "mass") {
+        Some(mass) => reader.number(mass, Bound::Positive)?,
+        None => whole.volume,
+    };
+    Some(Mass {
+        kg,
+        com: whole.centre,
+        about_com: Some(whole.about_centre * (kg / whole.volume)),
+    })
+}
+
+/// Returns the exact solid of a collision; those that are simulated as meshes have less volume.
+fn of_geometry(solid: &Solid, reader: &mut Reader) -> Option<SolidMass> {
+    let geometry = xml::child(solid.collision, "geometry")?;
+    let parameter = |kind: Node, name: &str, reader: &mut Reader| {
+        reader.number(xml::child(kind, name)?, Bound::Length)
+    };
+    if let Some(ellipsoid) = xml::child(geometry, "ellipsoid") {
+        let radii = xml::child(ellipsoid, "radii")?;
+        let radii = reader.numbers(radii, xml::text(radii), Bound::Length)?;
+        return Some(SolidMass::of_ellipsoid(radii));
+    }
+    if let Some(cone) = xml::child(geometry, "cone") {
+        let (radius, length) = (
+            parameter(cone, "radius", reader)?,
+            parameter(cone, "length", reader)?,
+        );
+        return Some(SolidMass::of_cone(radius, length));
+    }
+    SolidMass::of(&solid.shape)
+}
