@@ -133,10 +133,7 @@ fn misspelt_places_are_errors_also_without_maps() {
         for command in [&["check", file][..], &["run", file, "--history", "h"]] {
             let (code, said) = said(folder.path(), command);
             assert_eq!(code, 2, "{said}");
-            assert!(
-                said.contains("C021") && said.contains(why),
-                "{said}"
-            );
+            assert!(said.contains("C021") && said.contains(why), "{said}");
         }
     }
 }
