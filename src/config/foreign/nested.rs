@@ -270,6 +270,10 @@ impl Tree {
     fn read_joint(&self, joint: &Written, reader: &mut Reader) -> Option<Joint> {
         let node = joint.node;
         sdf_joint::JOINT.check(node, reader);
+        let is_rigid = sdf_joint::is_rigid(node);
+        if !is_rigid {
+            sdf_joint::kind(node, reader)?;
+        }
         let name = node.attribute("name").unwrap_or_default();
         let (parent, child) = (
             self.end(joint, "parent", reader),
@@ -277,7 +281,6 @@ impl Tree {
         );
         let (parent, child) = (parent?, child?);
         let to_world = parent == End::World || child == End::World;
-        let is_rigid = sdf_joint::is_rigid(node);
         let moves = if is_rigid {
             None
         } else {
@@ -517,7 +520,8 @@ impl<'a> Elements<'a> {
                 }
                 "plugin" => {
                     let message = "the plugin is not run".to_owned();
-                    reader.warning("W036", child, message, "the model works without it");
+                    let help = "forces and motions by plugins are not simulated";
+                    reader.warning("W036", child, message, help);
                 }
                 _ => {}
             }

@@ -45,8 +45,23 @@ pub(crate) fn read(
     if is_computed {
         computed(inertial, solids, reader)
     } else {
-        stated(inertial, at, reader)
+        let mut mass = stated(inertial, at, reader)?;
+        if mass.about_com.is_none() && xml::child(inertial, "pose").is_some() {
+            mass.about_com = of_solids(solids, mass.kg);
+        }
+        Some(mass)
     }
+}
+
+/// Computes the moments of a link with a stated mass and centre from its solids. Returns `None` if
+/// one of them has no volume.
+fn of_solids(solids: &[Solid], kg: f64) -> Option<Matrix3<f64>> {
+    let masses = solids
+        .iter()
+        .map(|solid| Some(SolidMass::of(&solid.shape)?.placed(&solid.at, 1.0)))
+        .collect::<Option<Vec<SolidMass>>>()?;
+    let whole = SolidMass::together(&masses)?;
+    Some(whole.about_centre * (kg / whole.volume))
 }
 
 /// Warns of densities in a link whose mass is not computed from them.

@@ -61,14 +61,8 @@ const LIMIT: Children = Children {
     refused: &[],
 };
 
-/// Reads a joint of a model at a pose, whose own pose is relative to the frame `child`. Reports W033 to W035, and
-/// returns `None`, if it can't be simulated.
-pub(crate) fn read(
-    joint: Node,
-    child: &Isometry3<f64>,
-    model: &Isometry3<f64>,
-    reader: &mut Reader,
-) -> Option<PartJoint> {
+/// Returns the type of a joint. Reports W035, and returns `None`, if it can't be simulated.
+pub(crate) fn kind<'a>(joint: Node<'a>, reader: &mut Reader) -> Option<&'a str> {
     let name = joint.attribute("name").unwrap_or_default();
     let kind = joint.attribute("type").unwrap_or("unknown");
     if !["revolute", "continuous", "prismatic"].contains(&kind) {
@@ -81,6 +75,19 @@ pub(crate) fn read(
         );
         return None;
     }
+    Some(kind)
+}
+
+/// Reads a joint of a model at a pose, whose own pose is relative to the frame `child`. Reports W033 to W035, and
+/// returns `None`, if it can't be simulated.
+pub(crate) fn read(
+    joint: Node,
+    child: &Isometry3<f64>,
+    model: &Isometry3<f64>,
+    reader: &mut Reader,
+) -> Option<PartJoint> {
+    let name = joint.attribute("name").unwrap_or_default();
+    let kind = kind(joint, reader)?;
     let at = child * pose(joint, reader)?;
     let axis = reader.required(joint, "axis")?;
     AXIS.check(axis, reader);

@@ -184,6 +184,12 @@ fn a_mass_follows_from_volumes_and_densities_where_the_file_asks_for_it() {
             );
         }
     }
+    // Without moments, the stated centre is used with those of the shapes.
+    let heavy_below = "<inertial><mass>0.3</mass><pose>0 0 -0.04 0 0 0</pose></inertial>";
+    let (model, _) = link(&format!("{heavy_below}{}", collision("", ""))).expect("it has a mass");
+    let inertia = model.inertia.expect("it has a centre");
+    near(inertia.com_m[2], 0.01);
+    near(inertia.about_com[2][2], 0.3 * 0.05 * 0.05 / 6.0);
     let (round, _) = link(
         "<inertial auto=\"true\"/><collision name=\"c\"><geometry><ellipsoid><radii>0.03 0.03 0.05</radii></ellipsoid>\
          </geometry></collision>",

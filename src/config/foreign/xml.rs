@@ -13,7 +13,7 @@ pub(crate) const LONGEST_MODEL: usize = 16 << 20;
 /// all others.
 const MOST_PARTS: usize = 1_000;
 /// Kinds of elements that models and worlds consist of.
-const PARTS: [&str; 5] = ["link", "joint", "collision", "include", "model"];
+const PARTS: [&str; 6] = ["link", "joint", "collision", "include", "model", "frame"];
 /// Largest number of errors, and of warnings, that are reported for one file.
 const MOST_FAULTS: usize = 200;
 
