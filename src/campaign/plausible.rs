@@ -18,8 +18,8 @@ const GREATEST_DENSITY: f64 = 25_000.0;
 /// Nothing of this size fits into a scene; in millimetres that are read as metres, it would have
 /// 2 cm. Unit: metres.
 const LARGEST_M: f64 = 20.0;
-/// The same for furniture that is built in, such as walls: the floor of a world has a radius of 14 m. Unit:
-/// metres.
+/// The same for furniture that is built in, such as walls: the floor of a world has a radius of
+/// 14 m. Unit: metres.
 const LARGEST_BUILT_IN_M: f64 = 28.0;
 /// No gripper takes something this small; in metres that are read as millimetres, it would have
 /// 2 m. Unit: metres.

@@ -20,8 +20,8 @@ const TOUCH_M: f64 = 0.002;
 /// screws and cables of bases reach below the origin that is put on them. Unit: metres.
 const MOUNT_M: f64 = 0.02;
 
-/// The shifts with which a depth is searched, one after the other: rounding errors let a search fail
-/// where middles or faces coincide, as of a capsule in the middle of a cylinder. Unit: metres.
+/// The shifts with which a depth is searched, one after the other: rounding errors let a search
+/// fail where middles or faces coincide, as of a capsule in the middle of a cylinder. Unit: metres.
 const SHIFTS_M: [[f64; 3]; 4] = [
     [0.0, 0.0, 0.0],
     [7e-6, 3e-6, -5e-6],
