@@ -119,6 +119,7 @@ fn scene() -> Scene {
             restitution: (0.0, 0.0),
             steps_per_second: 240,
             iterations: 4,
+            shortcuts: true,
         },
     }
 }

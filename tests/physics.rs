@@ -140,6 +140,7 @@ pub(crate) fn scene(objects: Vec<SceneObject>) -> Scene {
             restitution: (0.0, 0.0),
             steps_per_second: 240,
             iterations: 2,
+            shortcuts: true,
         },
     }
 }

@@ -19,6 +19,7 @@ pub(crate) fn read_physics(root: &mut Table, found: &mut Diagnostics) -> Physics
         // 240 Hz with 4 iterations holds a friction grasp to 0.01 mm.
         steps_per_second: 240,
         iterations: 4,
+        shortcuts: true,
     };
     let Some(mut table) = root.table("physics") else {
         return physics;
@@ -47,6 +48,7 @@ pub(crate) fn read_physics(root: &mut Table, found: &mut Diagnostics) -> Physics
             .integer("iterations", 1..=64)
             .and_then(|n| u32::try_from(n).ok()),
     );
+    set(&mut physics.shortcuts, table.boolean("shortcuts"));
     table.finish(found);
     physics
 }

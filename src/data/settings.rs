@@ -18,6 +18,9 @@ pub struct Physics {
     pub steps_per_second: u32,
     /// Solver iterations per step.
     pub iterations: u32,
+    /// Whether the engine may be spared the parts of a tick that have no effect. Without, it
+    /// simulates everything in every tick, which takes several times as long.
+    pub shortcuts: bool,
 }
 
 /// Standard deviations of sensing and localisation errors; 0 is perfect.

@@ -488,6 +488,7 @@ pub(super) mod tests {
                 restitution: (0.0, 0.0),
                 steps_per_second: 240,
                 iterations: 2,
+                shortcuts: true,
             },
         };
         build(&scene).expect("the scene is valid")

@@ -156,6 +156,9 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
         floor,
         watch: None,
     };
+    if !scene.physics.shortcuts {
+        world.leave_to_engine();
+    }
     world.link_pairs = world.find_link_pairs();
     world.link_pairs.wholes = world.wholes();
     world.link_pairs.step_secs = world.engine.integration_parameters.dt;
