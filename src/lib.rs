@@ -23,10 +23,10 @@
 //! | [`base`] | sources and diagnostics, terms, facts, findings and outcomes, shipped files, lines for a shell | encoding_rs, shlex |
 //! | [`data`] | poses, recorded choices, models, scenes, traces | |
 //! | [`search`] | adaptive sampling of the unit cube, guided by margins; failure rates by importance weighting | statrs |
-//! | [`config`] | TOML text to a fully checked `Campaign`; models in our own and in third-party formats | toml, roxmltree, mesh-loader, shlex |
+//! | [`config`] | TOML text to a fully checked `Campaign`; models in our own and in third-party formats | toml, roxmltree, mesh-loader, urdf-rs (writer), shlex |
 //! | [`ontology`] | actions, properties, designators, categories and the vocabulary | oxrdf, oxrdfio (parsers) |
 //! | [`scenario`] | recorded choices to one concrete `Scene`; the order of simplicity for shrinking | parry3d (overlaps) |
-//! | [`world`] | a `Scene` to a stepping simulation; the only crate that uses the physics engine | rapier3d, parry3d, urdf-rs |
+//! | [`world`] | a `Scene` to a stepping simulation; the only crate that uses the physics engine | rapier3d, parry3d |
 //! | [`actions`] | the robot's actions through commands and observations; the `Trace` | |
 //! | [`protocol`] | actions performed by an external program, in lockstep over a socket | nix |
 //! | [`facts`] | a `Trace` to RDF facts, interned once | |

@@ -62,7 +62,7 @@ const FENCES: [(&str, &[&str]); 34] = [
     ("mcap", &["episodes"]),
     ("prost", &["episodes"]),
     ("pyo3", &["judge"]),
-    ("urdf-rs", &["world"]),
+    ("urdf-rs", &["config"]),
     ("datafrog", &["rules"]),
     ("polars", &["analysis"]),
     ("rayon", &["campaign"]),

@@ -214,7 +214,7 @@ fn objects_of_mujoco_have_the_values_of_their_files() {
     fs::create_dir_all(models.join("chest")).unwrap();
     let tin = "<?xml version=\"1.0\"?><!-- a tin --><mujoco><compiler angle=\"degree\"/><worldbody><body><body name=\"object\"><freejoint/>\
         <geom type=\"cylinder\" size=\"0.03 0.05\" density=\"500\" friction=\"0.7 0.3 0.1\"/>\
-        <geom type=\"box\" size=\"1 1 1\" contype=\"0\" conaffinity=\"0\"/></body>\
+        <geom type=\"box\" size=\"1 1 1\" contype=\"0\" conaffinity=\"0\" mass=\"0\"/></body>\
         <site name=\"top\" pos=\"0 0 0.05\"/></body></worldbody></mujoco>";
     let chest = "<mujoco><worldbody><body name=\"chest\"><joint type=\"free\"/>\
         <geom type=\"box\" size=\"0.2 0.1 0.1\" mass=\"3\"/><geom type=\"ellipsoid\" size=\"0.05 0.05 0.02\" pos=\"0 0 0.1\" mass=\"1\"/>\

@@ -323,7 +323,7 @@ pub fn bare(
             true => digest_of(&read.text.text),
             false => digest_of(&format!("{}{}", digest_of(&read.text.text), read.digest)),
         },
-        urdf: read.urdf(),
+        urdf: read.urdf.clone(),
         tree: Arc::new(read.tree),
         base_joints: None,
         planar_base: false,
@@ -512,7 +512,7 @@ fn read_table(
     }
     let profile = RobotProfile {
         name,
-        urdf: read.urdf(),
+        urdf: read.urdf.clone(),
         tree: Arc::new(read.tree.clone()),
         base_joints,
         planar_base,

@@ -26,7 +26,6 @@ mod snapshot;
 mod stream;
 mod trace;
 mod tree;
-mod tree_urdf;
 
 pub use choice_name::{ChoiceGroup, ChoiceName, OBSTACLE_LIST};
 pub use choice_parts::{ObjectAxis, PlacedObject, PlanarAxis, SightingAxis, StartAxis, WheelAxis};

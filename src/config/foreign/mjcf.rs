@@ -96,7 +96,7 @@ fn whole(
 }
 
 /// Reads the settings of a text, and calls `read` with its root and a model without bodies. Returns
-/// what that returns, the text with all included files, and warnings.
+/// its result, the text with all included files, and warnings.
 pub(super) fn with_model<T>(
     source: &Source,
     path: &Path,

@@ -48,6 +48,7 @@ mod tree_object;
 mod urdf;
 mod urdf_extra;
 mod urdf_tree;
+mod urdf_writer;
 pub(crate) mod world;
 mod world_state;
 mod xml;

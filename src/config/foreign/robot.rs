@@ -8,8 +8,8 @@ use crate::foreign::lookup::Lookup;
 use crate::foreign::robot_inertia::{self, Mend};
 use crate::foreign::urdf_tree::{self, UrdfTree};
 use crate::foreign::xml::{self, Reader};
-use crate::foreign::{mjcf, robot_shapes, root_name, sdf_robot, tree_checks};
-use actcheck_base::{Diagnostics, Source};
+use crate::foreign::{mjcf, robot_shapes, root_name, sdf_robot, tree_checks, urdf_writer};
+use actcheck_base::{Diagnostic, Diagnostics, Source};
 use actcheck_data::{ModelTree, Shape};
 
 /// A robot as its file states it.
@@ -21,20 +21,10 @@ pub(crate) struct RobotFile {
     pub(crate) digest: String,
     /// The text with all that it includes.
     pub(crate) text: Source,
+    /// The robot in URDF: its own text, or its tree in this form.
+    pub(crate) urdf: Source,
     /// Proposed changes of impossible moments of inertia; only for URDF.
     pub(crate) mends: Vec<Mend>,
-    is_urdf: bool,
-}
-
-impl RobotFile {
-    /// Returns the robot in URDF: its own text, or its tree in this form.
-    pub(crate) fn urdf(&self) -> Source {
-        if self.is_urdf {
-            self.text.clone()
-        } else {
-            Source::new(format!("{} (as URDF)", self.text.name), self.tree.to_urdf())
-        }
-    }
 }
 
 /// A tree before its shapes are read.
@@ -135,12 +125,27 @@ fn complete(mut bare: Bare, path: &Path, lookup: &Lookup, found: &mut Diagnostic
         }
     }
     let mends = robot_inertia::check(tree, &meshes, found);
+    let urdf = if bare.is_urdf {
+        bare.text.clone()
+    } else {
+        let written = urdf_writer::write(&bare.tree).unwrap_or_else(|error| {
+            let message = format!("the robot can't be written as URDF for skills: {error}");
+            let help = "report this bug; name a URDF instead";
+            found.push(
+                Diagnostic::error("W020", message)
+                    .in_source(&bare.text)
+                    .help(help),
+            );
+            String::new()
+        });
+        Source::new(format!("{} (as URDF)", bare.text.name), written)
+    };
     RobotFile {
+        urdf,
         meshes,
         digest: shapes.digest.finish(),
         text: bare.text,
         mends: if bare.is_urdf { mends } else { Vec::new() },
         tree: bare.tree,
-        is_urdf: bare.is_urdf,
     }
 }
