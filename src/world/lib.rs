@@ -88,7 +88,7 @@ pub use layout::{
     outward_push, shapes_between_fingers,
 };
 pub use overlaps::Overlap;
-pub use propose::{Proposal, complete, is_incomplete, propose};
+pub use propose::{FingerJoint, Proposal, UnknownHand, complete, is_incomplete, propose};
 pub use reach::Shortcuts;
 pub use recorder::{Contact, Course, Record, Tracks};
 pub use robot::geometry;
