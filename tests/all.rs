@@ -41,6 +41,7 @@ mod fuzz_corpus;
 mod fuzz_imports;
 mod fuzz_strangers;
 mod gallery;
+mod hand_gaps;
 mod health;
 mod help;
 mod history;

@@ -43,6 +43,7 @@ mod starts;
 mod tally;
 mod workers;
 
+pub use actcheck_world::{FingerJoint, Proposal, UnknownHand};
 pub use budget::ExhaustedBudget;
 pub use changes::{ChangeKind, InputChange, changes, made_by_other_physics, other_physics};
 pub use difference::TraceDifference;

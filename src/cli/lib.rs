@@ -30,6 +30,7 @@ mod export_run;
 mod export_store;
 mod export_tables;
 mod groups;
+mod hand_gap;
 mod health;
 mod history_dir;
 mod import;

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::new_files::NewFiles;
-use crate::output;
-use actcheck_base::{Diagnostics, Files, ShellLine};
-use actcheck_campaign::proposed_robot;
+use crate::{hand_gap, output};
+use actcheck_base::{Diagnostics, Files, ShellLine, Source};
+use actcheck_campaign::{Proposal, UnknownHand, proposed_robot};
 use actcheck_config::robot;
 use actcheck_data::RobotProfile;
 
@@ -37,7 +37,11 @@ pub struct NewRobotArgs {
     pub out: Option<PathBuf>,
 }
 
-/// Writes a profile proposed for a robot's model.
+/// Writes a profile proposed for a robot's model; with a gap for the hand if no gripper was found.
+///
+/// # Errors
+/// Faults of the model (W…), W024 after a profile with a gap was written, X015 if the profile
+/// exists, X007 if it can't be written.
 pub fn robot(args: &NewRobotArgs) -> Result<(), Diagnostics> {
     let bare = robot::bare(
         &Files::Disk,
@@ -52,11 +56,24 @@ pub fn robot(args: &NewRobotArgs) -> Result<(), Diagnostics> {
         .unwrap_or_else(|| PathBuf::from(format!("{name}.toml")));
     let folder = out.parent().unwrap_or(Path::new(""));
     let proposal = proposed_robot(bare, &folder.join(HISTORY), args.hand.as_deref())?;
-    let (profile, notes, other_hands) = (proposal.profile, proposal.notes, proposal.other_hands);
+    let text = text(&proposal, args, folder);
     let mut files = NewFiles::default();
-    files.add(&out, text(&profile, &notes, args, folder));
+    files.add(&out, text.as_bytes());
     files.write("name another file with `--out PROFILE`, or delete it")?;
+    output::print_prose(&written(&proposal, &out));
+    match &proposal.unknown_hand {
+        Some(hand) => {
+            Err(hand_gap::fault(hand, &Source::new(out.display().to_string(), text)).into())
+        }
+        None => Ok(()),
+    }
+}
+
+/// The message about a written profile.
+fn written(proposal: &Proposal, out: &Path) -> String {
+    let profile = &proposal.profile;
     let gripper = match &profile.suction {
+        _ if proposal.unknown_hand.is_some() => "no gripper yet".to_owned(),
         Some(cup) => format!(
             "a suction cup of {:.0} mm at {}",
             cup.radius_m * 2e3,
@@ -70,9 +87,13 @@ pub fn robot(args: &NewRobotArgs) -> Result<(), Diagnostics> {
             )
         }
     };
-    output::print_prose(&format!(
+    let next = match proposal.unknown_hand {
+        Some(_) => "fill in the gap in this file, then ",
+        None => "",
+    };
+    let mut message = format!(
         "wrote {}: {} with an arm of {} joints, {gripper}, camera {}\n\
-         next: name it as `profile` in `[robot]` of a configuration, then `actcheck check CONFIG`\n",
+         next: {next}name it as `profile` in `[robot]` of a configuration, then `actcheck check CONFIG`\n",
         out.display(),
         if profile.base_joints.is_some() {
             "a mobile robot"
@@ -81,35 +102,40 @@ pub fn robot(args: &NewRobotArgs) -> Result<(), Diagnostics> {
         },
         profile.arm_joints.len(),
         profile.camera_link,
-    ));
-    if !other_hands.is_empty() {
-        let others = other_hands.join("`, `");
-        output::print_prose(&format!(
+    );
+    if !proposal.other_hands.is_empty() {
+        let others = proposal.other_hands.join("`, `");
+        message.push_str(&format!(
             "this robot has another hand at `{others}`: `--hand TEXT` proposes a profile for it\n"
         ));
     }
-    Ok(())
+    message
 }
 
 /// The profile as TOML, with a comment for each guess. The keys that the program finds on the model
 /// whenever it reads the profile are comments too.
-fn text(
-    profile: &RobotProfile,
-    notes: &BTreeMap<&'static str, String>,
-    args: &NewRobotArgs,
-    folder: &Path,
-) -> String {
+fn text(proposal: &Proposal, args: &NewRobotArgs, folder: &Path) -> String {
+    let Proposal {
+        profile,
+        notes,
+        unknown_hand,
+        ..
+    } = proposal;
     let command = ShellLine::default()
         .fixed("actcheck new robot")
         .file(&args.model);
     let title = format!("# Proposed by `{command}`: check each guess.\n");
-    let stated = lines(&stated(profile, args, folder), notes);
-    let found = lines(&found(profile), notes)
+    let stated = lines(&stated(proposal, args, folder), notes);
+    let gap = unknown_hand
+        .as_ref()
+        .map(hand_gap::text)
+        .unwrap_or_default();
+    let found = lines(&found(profile, unknown_hand.as_ref()), notes)
         .lines()
         .map(commented)
         .collect::<String>();
     format!(
-        "{title}\n{stated}\n# Found on the model whenever this profile is read. To change a line, remove its `# `, and those of \
+        "{title}\n{stated}{gap}\n# Found on the model whenever this profile is read. To change a line, remove its `# `, and those of \
          all lines\n# about the same link.\n{found}"
     )
 }
@@ -134,11 +160,8 @@ fn lines(keys: &[(&'static str, String)], notes: &BTreeMap<&'static str, String>
 }
 
 /// The keys that a profile needs, or that decide about the others.
-fn stated(
-    profile: &RobotProfile,
-    args: &NewRobotArgs,
-    folder: &Path,
-) -> Vec<(&'static str, String)> {
+fn stated(proposal: &Proposal, args: &NewRobotArgs, folder: &Path) -> Vec<(&'static str, String)> {
+    let profile = &proposal.profile;
     let mut keys = vec![("urdf", quoted(&seen_from(folder, &args.model)))];
     if !args.package_dirs.is_empty() {
         let folders: Vec<String> = args
@@ -173,7 +196,7 @@ fn stated(
         keys.extend(grasp_frame(profile));
         keys.push(("suction_force_n", cup.force_n.to_string()));
         keys.push(("suction_radius_m", cup.radius_m.to_string()));
-    } else {
+    } else if proposal.unknown_hand.is_none() {
         keys.push(("finger_joints", list(&profile.finger_joints)));
         keys.push(("finger_links", list(&profile.finger_links)));
     }
@@ -192,9 +215,9 @@ fn stated(
 }
 
 /// The keys that a profile may leave out.
-fn found(profile: &RobotProfile) -> Vec<(&'static str, String)> {
+fn found(profile: &RobotProfile, gap: Option<&UnknownHand>) -> Vec<(&'static str, String)> {
     let mut keys = Vec::new();
-    if profile.suction.is_none() {
+    if profile.suction.is_none() && gap.is_none() {
         keys.extend(grasp_frame(profile));
         keys.push(("max_opening_m", profile.max_opening_m.to_string()));
     }
@@ -240,7 +263,7 @@ fn seen_from(folder: &Path, path: &Path) -> String {
 }
 
 /// A basic string of TOML.
-fn quoted(text: &str) -> String {
+pub(super) fn quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
 }
 
@@ -255,7 +278,8 @@ fn list(names: &[String]) -> String {
     )
 }
 
-fn numbers(values: &[f64]) -> String {
+/// A list of numbers in TOML.
+pub(super) fn numbers(values: &[f64]) -> String {
     format!(
         "[{}]",
         values

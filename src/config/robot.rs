@@ -564,7 +564,12 @@ fn finger_joints(table: &mut Table, roles: &mut Roles) -> Option<Vec<String>> {
             list.len()
         );
         let help = "name the joints with motors; joints that mimic them follow without being named";
-        table.fault("W011", span, message, help);
+        table.fault(
+            "W011",
+            span,
+            message,
+            with_candidates(help, list.is_empty()),
+        );
         return None;
     }
     Some(values(list))
@@ -592,9 +597,18 @@ pub(super) fn names<const N: usize>(
         } else {
             "see models/robots/mobile_manipulator.toml for an example"
         };
-        table.fault("W011", span, message, help);
+        let is_gap = length == 0 && key.starts_with("finger");
+        table.fault("W011", span, message, with_candidates(help, is_gap));
     }
     names
+}
+
+/// The help about a list of the hand; an empty one may be a gap that `actcheck new robot` left.
+fn with_candidates(help: &str, is_gap: bool) -> String {
+    match is_gap {
+        true => format!("{help}; `actcheck new robot` lists the candidates above such a gap"),
+        false => help.to_owned(),
+    }
 }
 
 /// Reads one position for each arm joint.

@@ -125,6 +125,12 @@ pub enum GripperFault {
     /// The links with the names of fingers do not close.
     #[error("no two links of its gripper face each other and come closer")]
     NoOpposition,
+    /// No fingers were found with the work that a proposal may take.
+    #[error(
+        "no two links of its gripper that face each other were found before the search was cut short, because it has many \
+         joints and shapes"
+    )]
+    CutShort,
 }
 
 impl WorldError {

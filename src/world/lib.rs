@@ -90,7 +90,7 @@ pub use layout::{
 };
 pub use measures::{RobotMeasures, robot_measures};
 pub use overlaps::Overlap;
-pub use propose::{Proposal, complete, is_incomplete, propose};
+pub use propose::{FingerJoint, Proposal, UnknownHand, complete, is_incomplete, propose};
 pub use reach::Shortcuts;
 pub use recorder::{Contact, Course, Record, Tracks};
 pub use robot::geometry;

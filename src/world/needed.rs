@@ -83,9 +83,19 @@ impl<'a> Needed<'a> {
             && self
                 .moving
                 .as_ref()
-                .map_or(!self.parked.contains_key(name), |moving| {
-                    moving.contains(name)
-                })
+                .map_or(!self.is_parked(joint), |moving| moving.contains(name))
+    }
+
+    /// Whether the profile parks a joint, or one that it follows.
+    fn is_parked(&self, joint: &TreeJoint) -> bool {
+        let leader = |own: &&TreeJoint| {
+            let mimic = own.mimic.as_ref()?;
+            self.joints.get(mimic.leader.as_str()).copied()
+        };
+        // A chain of couplings that is longer than this is a circle.
+        std::iter::successors(self.joints.get(joint.name.as_str()).copied(), leader)
+            .take(self.joints.len())
+            .any(|own| self.parked.contains_key(own.name.as_str()))
     }
 
     /// The position of a rigid joint: that of the profile, otherwise 0 or the limit nearest to it;

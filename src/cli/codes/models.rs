@@ -79,10 +79,12 @@ const CODES_W: &[Code] = &[
     ),
     code(
         "W024",
-        "the opening of the robot's gripper can't be measured, or is smaller than `max_opening_m`; or no arm carries it",
+        "the opening of the robot's gripper can't be measured, or is smaller than `max_opening_m`; no gripper was found; or no \
+         arm carries it",
         "the grasp frame is not between the fingertips or is turned, or `finger_joints` or `finger_links` names others \
          than those that move",
-        "follow the help: fingers open along the y axis of the grasp frame, whose origin is between the fingertips",
+        "fill in the gap that `new robot` left; otherwise follow the help: fingers open along the y axis of the \
+         grasp frame, whose origin is between the fingertips",
     ),
     code(
         "W030",

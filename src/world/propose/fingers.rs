@@ -8,6 +8,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use super::between::{Between, CENTRED_AT_M, driven};
 use super::body::chain;
 use super::cup;
+use super::effort::Effort;
 use super::frames::{LEAST_CHANGE_M, behind, frames};
 use super::hands::groups;
 use super::row::{across, amid, beside};
@@ -24,6 +25,12 @@ const MOST_PAIRS: usize = 40;
 const FEWEST_ARM_JOINTS: usize = 4;
 /// Weight of fingers that point back to the palm: the joints of some fingers are at their tips.
 const BACKWARDS: f64 = 0.2;
+/// Scores that differ by less than this are equal.
+const EQUAL_SCORE: f64 = 1e-9;
+/// Steps of one measured gap, besides one for each solid of both fingers.
+const STEPS_OF_GAP: u64 = 4;
+/// Gaps that are measured to rate a candidate, at most.
+const GAPS_OF_RATING: u64 = 140;
 /// Openings wider than this are worth no more. Unit: metres.
 const WIDE_M: f64 = 0.12;
 
@@ -40,7 +47,8 @@ pub(super) struct ProposedHand {
 }
 
 /// Finds the best gripper, and keeps the parts that the profile names. Of several hands, only those
-/// with `wanted` in a name of theirs or of their arm count.
+/// with `wanted` in a name of theirs or of their arm count. Without steps left of the effort, it is
+/// the best of those that were measured.
 ///
 /// # Errors
 /// [`NoHand`] if there is none.
@@ -48,6 +56,7 @@ pub(super) fn find(
     partial: &RobotProfile,
     model: &RobotModel,
     wanted: Option<&str>,
+    effort: &mut Effort,
 ) -> Result<ProposedHand, NoHand> {
     let stated = Stated::of(partial, model)?;
     if let (Some(_), Some((palm, _))) = (partial.suction, stated.grasp) {
@@ -118,30 +127,47 @@ pub(super) fn find(
         meshes: BTreeMap::new(),
         ..partial.clone()
     };
-    let best = rated
-        .iter()
-        .find_map(|(_, palm, joints)| measure(&light, model, &stated, *palm, joints));
-    let others_than = |own: usize| {
-        // A link on the way to this hand is a wrist that is named after it.
-        let inner = chain(model, own);
-        let is_elsewhere = |palm: &&usize| {
-            **palm != own && palm.checked_sub(1).is_none_or(|idx| !inner.contains(&idx))
-        };
-        let others = groups
-            .keys()
-            .filter(is_elsewhere)
-            .filter(|palm| chain(model, **palm).len() >= FEWEST_ARM_JOINTS);
-        others.map(|palm| model.links[*palm].name.clone()).collect()
-    };
+    let mut best = None;
+    for (place, (_, palm, joints)) in rated.iter().enumerate() {
+        let mut part = effort.part(rated.len() - place);
+        best = measure(&light, model, &stated, (*palm, joints), &mut part);
+        effort.join(&part);
+        if best.is_some() {
+            break;
+        }
+    }
     let best = best.map(|hand| ProposedHand {
         profile: RobotProfile {
             meshes: partial.meshes.clone(),
             ..hand.profile
         },
-        others: others_than(hand.palm),
+        others: others_than(model, &groups, hand.palm),
         ..hand
     });
-    best.ok_or_else(|| NoHand::Gripper(why_none(model, &rated)))
+    best.ok_or_else(|| {
+        NoHand::Gripper(match why_none(model, &rated) {
+            GripperFault::NoOpposition if effort.is_cut() => GripperFault::CutShort,
+            fault => fault,
+        })
+    })
+}
+
+/// The names of the links that carry other hands, at the end of arms, than the one on this link.
+pub(super) fn others_than(
+    model: &RobotModel,
+    groups: &BTreeMap<usize, BTreeSet<usize>>,
+    own: usize,
+) -> Vec<String> {
+    // A link on the way to this hand is a wrist that is named after it.
+    let inner = chain(model, own);
+    let is_elsewhere = |palm: &&usize| {
+        **palm != own && palm.checked_sub(1).is_none_or(|idx| !inner.contains(&idx))
+    };
+    let others = groups
+        .keys()
+        .filter(is_elsewhere)
+        .filter(|palm| chain(model, **palm).len() >= FEWEST_ARM_JOINTS);
+    others.map(|palm| model.links[*palm].name.clone()).collect()
 }
 
 /// Whether a name of a hand or of the arm that carries it contains a text; for `left` and `right`,
@@ -194,7 +220,7 @@ fn why_none(model: &RobotModel, groups: &[(usize, usize, &BTreeSet<usize>)]) -> 
 }
 
 /// Long chains before short ones, then right hands.
-fn rank(model: &RobotModel, palm: usize) -> usize {
+pub(super) fn rank(model: &RobotModel, palm: usize) -> usize {
     let name = model.links[palm].name.to_lowercase();
     let is_right = name.contains("right") || name.starts_with("r_") || name.contains("_r_");
     4 * chain(model, palm).len().min(6) + usize::from(is_right)
@@ -207,62 +233,93 @@ struct HandCandidate {
     links: [usize; 2],
     frame: Isometry3<f64>,
     widest_m: f64,
+    /// The place of its pair, and that of its joints among those that could drive the pair.
+    place: [usize; 2],
+}
+
+impl HandCandidate {
+    /// Whether it is better than another; of equal ones, the first pair with its first joints is.
+    fn is_better(&self, other: &Option<Self>) -> bool {
+        other.as_ref().is_none_or(|other| {
+            let is_before = self.place < other.place && self.score >= other.score - EQUAL_SCORE;
+            self.score > other.score + EQUAL_SCORE || is_before
+        })
+    }
+}
+
+/// The best of all pairs of fingers, joints that could drive them, and frames. Each pair is
+/// measured with its first joints before any with its second ones, so that a cut search has seen
+/// all fingers.
+fn best_candidate(
+    bare: &RobotProfile,
+    model: &RobotModel,
+    stated: &Stated,
+    (palm, joints): (usize, &BTreeSet<usize>),
+    effort: &mut Effort,
+) -> Option<HandCandidate> {
+    let mut best: Option<HandCandidate> = None;
+    let pairs = pairs(model, palm, (joints, stated));
+    let n_ways = pairs.iter().map(|(_, drives)| drives.len()).max();
+    let places =
+        (0..n_ways.unwrap_or(0)).flat_map(|way| (0..pairs.len()).map(move |pair| [pair, way]));
+    for [pair, way] in places {
+        let (links, Some(named)) = (pairs[pair].0, pairs[pair].1.get(way)) else {
+            continue;
+        };
+        let n_solids: usize = links
+            .iter()
+            .map(|link| model.links[*link].solids.len())
+            .sum();
+        let steps_of_gap = STEPS_OF_GAP + n_solids as u64;
+        let all = match stated.grasp {
+            Some((_, frame)) => vec![(1.0, frame)],
+            None => frames(model, palm, (links, named), steps_of_gap, effort),
+        };
+        for (weight, frame) in all {
+            if effort.is_spent() {
+                return best;
+            }
+            effort.spend(GAPS_OF_RATING * steps_of_gap);
+            let Some(found) = rate(bare, model, palm, links, named, frame) else {
+                continue;
+            };
+            let weight = weight * powered(model, named, joints) * tips(model, links, joints);
+            let further = beside(model, (links, named), joints, palm);
+            let weight = weight * amid(model, named, &further) * across(model, named, &further);
+            let found = HandCandidate {
+                score: found.score * weight,
+                place: [pair, way],
+                ..found
+            };
+            // Rays are cast only for candidates that could be the best.
+            if !found.is_better(&best) {
+                continue;
+            }
+            let between = Between {
+                bare,
+                model,
+                palm,
+                links,
+                named,
+            };
+            let score = found.score * innermost(&between, found.frame, joints);
+            let found = HandCandidate { score, ..found };
+            if found.is_better(&best) {
+                best = Some(found);
+            }
+        }
+    }
+    best
 }
 
 fn measure(
     bare: &RobotProfile,
     model: &RobotModel,
     stated: &Stated,
-    palm: usize,
-    joints: &BTreeSet<usize>,
+    (palm, joints): (usize, &BTreeSet<usize>),
+    effort: &mut Effort,
 ) -> Option<ProposedHand> {
-    let mut best: Option<HandCandidate> = None;
-    for (links, drives) in pairs(model, palm, (joints, stated))
-        .into_iter()
-        .take(MOST_PAIRS)
-    {
-        for named in drives {
-            let all = match stated.grasp {
-                Some((_, frame)) => vec![(1.0, frame)],
-                None => frames(model, palm, links, &named),
-            };
-            for (weight, frame) in all {
-                let Some(found) = rate(bare, model, palm, links, &named, frame) else {
-                    continue;
-                };
-                let weight = weight * powered(model, &named, joints) * tips(model, links, joints);
-                let further = beside(model, (found.links, &found.named), joints, palm);
-                let weight = weight
-                    * amid(model, &found.named, &further)
-                    * across(model, &found.named, &further);
-                let is_better = |found: &HandCandidate, best: &Option<HandCandidate>| {
-                    best.as_ref()
-                        .is_none_or(|best| found.score > best.score + 1e-9)
-                };
-                let found = HandCandidate {
-                    score: found.score * weight,
-                    ..found
-                };
-                // Rays are cast only for candidates that could be the best.
-                if !is_better(&found, &best) {
-                    continue;
-                }
-                let between = Between {
-                    bare,
-                    model,
-                    palm,
-                    links: found.links,
-                    named: &found.named,
-                };
-                let score = found.score * innermost(&between, found.frame, joints);
-                let found = HandCandidate { score, ..found };
-                if is_better(&found, &best) {
-                    best = Some(found);
-                }
-            }
-        }
-    }
-    let mut found = best?;
+    let mut found = best_candidate(bare, model, stated, (palm, joints), effort)?;
     let mut deeper = false;
     let between = Between {
         bare,
@@ -309,7 +366,7 @@ fn measure(
         profile.finger_links = found.links.map(|link| model.links[link].name.clone());
         notes.insert(
             "finger_links",
-            "these two face each other and open widest".to_owned(),
+            format!("these two face each other and open widest{}", cut(effort)),
         );
     }
     if stated.grasp.is_none() {
@@ -338,6 +395,17 @@ fn measure(
         others: Vec::new(),
         score: found.score,
     })
+}
+
+/// A remark about a search that was cut short.
+fn cut(effort: &Effort) -> &'static str {
+    match effort.is_cut() {
+        true => {
+            ", of those measured: the search was cut short, because the hand has many joints and \
+                 shapes"
+        }
+        false => "",
+    }
 }
 
 /// Not wider than measured, up to the rounding of limits. Unit: metres.
@@ -414,6 +482,7 @@ fn pairs(
         .map_or_else(|| facing(model, palm, joints), |links| vec![links]);
     links
         .into_iter()
+        .take(MOST_PAIRS)
         .map(|links| (links, ways(links)))
         .collect()
 }
@@ -491,6 +560,7 @@ fn rate(
         links,
         frame,
         widest_m,
+        place: [0, 0],
     })
 }
 
@@ -531,6 +601,14 @@ mod tests {
 
     /// The hand that is found on a palm with these shapes and fingers.
     fn found_on(shapes: &str, fingers: &[String]) -> RobotProfile {
+        let (profile, model) = hand(shapes, fingers);
+        find(&profile, &model, None, &mut Effort::whole())
+            .unwrap_or_else(|_| panic!("there is a hand"))
+            .profile
+    }
+
+    /// A profile without roles of a palm with these shapes and fingers.
+    fn hand(shapes: &str, fingers: &[String]) -> (RobotProfile, RobotModel) {
         let path = Path::new("models/robots/fixed_arm.toml");
         let shipped = actcheck_config::robot::read(&Files::Shipped, path)
             .expect("the shipped robot is valid");
@@ -539,7 +617,6 @@ mod tests {
             fingers.concat()
         );
         let profile = RobotProfile {
-            urdf: Source::new("hand.urdf", text),
             arm_joints: Vec::new(),
             finger_joints: Vec::new(),
             finger_links: [String::new(), String::new()],
@@ -547,10 +624,45 @@ mod tests {
             max_opening_m: 0.0,
             ..shipped
         };
+        let profile = actcheck_config::robot::with_urdf(profile, Source::new("hand.urdf", text))
+            .expect("it is a URDF");
         let model = RobotModel::read(&profile).expect("the hand is valid");
-        find(&profile, &model, None)
-            .unwrap_or_else(|_| panic!("there is a hand"))
-            .profile
+        (profile, model)
+    }
+
+    /// A search that is cut short proposes the best of the measured candidates with a remark, and the
+    /// same each time; one that measured none says so.
+    #[test]
+    fn a_search_without_steps_left_proposes_the_best_so_far() {
+        let (profile, model) = hand(
+            "",
+            &[
+                finger("finger_bar_left", [0.0, 0.04], 0.06, 1.0),
+                finger("finger_bar_right", [0.0, -0.04], 0.06, -1.0),
+                finger("finger_pad_left", [0.0, 0.006], 0.06, 1.0),
+                finger("finger_pad_right", [0.0, -0.006], 0.06, -1.0),
+            ],
+        );
+        let with = |steps: u64| find(&profile, &model, None, &mut Effort::of(steps));
+        let fault = match with(0) {
+            Err(NoHand::Gripper(fault)) => fault,
+            _ => panic!("nothing was measured"),
+        };
+        assert_eq!(fault, GripperFault::CutShort);
+        let is_cut = |hand: &ProposedHand| hand.notes["finger_links"].contains("cut short");
+        let sizes = std::iter::successors(Some(1000), |steps| Some(2 * steps));
+        let found: Vec<(u64, ProposedHand)> = sizes
+            .take(14)
+            .filter_map(|steps| Some((steps, with(steps).ok()?)))
+            .collect();
+        let (steps, first) = &found[0];
+        assert!(is_cut(first), "{steps}");
+        assert_eq!(
+            with(*steps).ok().map(|hand| hand.profile),
+            Some(first.profile.clone())
+        );
+        let (_, last) = &found[found.len() - 1];
+        assert!(!is_cut(last) && last.score >= first.score);
     }
 
     /// Each finger has a pad and a bar outside of it, which opens wider; both slide with the same

@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use super::body::chain;
+use super::effort::Effort;
 use crate::description::RobotModel;
 use crate::gripper::Probe;
 use crate::kinematics::motion;
@@ -17,6 +18,8 @@ const TIP_M: f64 = 0.05;
 /// Axes closer than this to an axis of the palm are taken to be that axis. Unit: cosine (about 10
 /// degrees).
 const ALIGNED_COSINE: f64 = 0.985;
+/// Intervals of the way of two fingers at which their gap is compared.
+const EIGHTHS: u64 = 8;
 /// Least change of the gap between two fingers. Unit: metres.
 pub(super) const LEAST_CHANGE_M: f64 = 0.008;
 /// Weight of a direction from the palm's origin: its frame may be anywhere.
@@ -186,12 +189,14 @@ fn aligned(direction: Vector3<f64>) -> Vector3<f64> {
 
 /// Likely grasp frames of a pair, in the palm's frame, with weights: those at which both fingers
 /// have surfaces at several openings. The fingers point away from their joints or, less likely,
-/// from the palm's origin or shapes.
+/// from the palm's origin or shapes. The search ends early without steps left, of which each gap
+/// takes some.
 pub(super) fn frames(
     model: &RobotModel,
     palm: usize,
-    links: [usize; 2],
-    named: &[usize],
+    (links, named): ([usize; 2], &[usize]),
+    steps_of_gap: u64,
+    effort: &mut Effort,
 ) -> Vec<(f64, Isometry3<f64>)> {
     let ways: &[[bool; 2]] = if named.len() == 1 {
         &[[true, true]]
@@ -250,11 +255,16 @@ pub(super) fn frames(
                 let off = (known.translation.vector - frame.translation.vector).norm();
                 off < 1e-3 && known.rotation.angle_to(&frame.rotation) < 1e-2
             });
-            if !is_known
-                && closes(model, palm, links, &frame, |share| {
-                    posture(model, named, *way, share)
-                })
-            {
+            if is_known {
+                continue;
+            }
+            if effort.is_spent() {
+                return found;
+            }
+            effort.spend(2 * (EIGHTHS + 1) * steps_of_gap);
+            if closes(model, palm, links, &frame, |share| {
+                posture(model, named, *way, share)
+            }) {
                 found.push((weight, frame));
             }
         }
@@ -299,7 +309,8 @@ fn closes(
     let [left, right] = links;
     [[left, right], [right, left]].into_iter().any(|links| {
         let probe = Probe::new(model, links, (palm, *frame));
-        let gaps = (0..=8).filter_map(|eighth| probe.gap(&posture(f64::from(eighth) / 8.0)));
+        let gaps =
+            (0..=EIGHTHS).filter_map(|eighth| probe.gap(&posture(eighth as f64 / EIGHTHS as f64)));
         let widths: Vec<f64> = gaps.map(|gap| gap.width_m()).collect();
         let (least, most) = widths
             .iter()

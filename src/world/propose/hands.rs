@@ -15,7 +15,7 @@ const WORDS: [&str; 12] = [
 /// Fewest joints before a link whose branches may be fingers without such names, and most joints of
 /// such a finger.
 const FEWEST_BEFORE_BRANCHES: usize = 3;
-const LONGEST_FINGER: usize = 3;
+const LONGEST_FINGER: usize = 4;
 
 /// Joints with a gripper's name, by the link that carries them.
 pub(super) fn groups(model: &RobotModel) -> BTreeMap<usize, BTreeSet<usize>> {
@@ -37,11 +37,15 @@ pub(super) fn groups(model: &RobotModel) -> BTreeMap<usize, BTreeSet<usize>> {
         has_word(&model.joints[idx].name) || has_either(idx) && (is_coupled(idx) || !carries(idx))
     };
     // A mechanism that a gripper's motor moves belongs to the gripper, whatever its name.
-    let leads_named: BTreeSet<usize> = (0..model.joints.len())
-        .filter(|idx| is_coupled(*idx) && is_named(*idx))
-        .map(|idx| leader(model, idx))
+    let with_name: BTreeSet<usize> = (0..model.joints.len())
+        .filter(|idx| is_named(*idx))
         .collect();
-    let named = |idx: usize| is_named(idx) || leads_named.contains(&leader(model, idx));
+    let leads_named: BTreeSet<usize> = with_name
+        .iter()
+        .filter(|idx| is_coupled(**idx))
+        .map(|idx| leader(model, *idx))
+        .collect();
+    let named = |idx: usize| with_name.contains(&idx) || leads_named.contains(&leader(model, idx));
     let mut groups: BTreeMap<usize, BTreeSet<usize>> = BTreeMap::new();
     for idx in (0..model.joints.len()).filter(|idx| named(*idx)) {
         let path = chain(model, idx + 1);

@@ -9,6 +9,7 @@ mod between;
 mod beyond_body;
 mod body;
 mod cup;
+mod effort;
 mod fingers;
 mod frames;
 mod hands;
@@ -18,6 +19,7 @@ mod seat;
 mod short_arm;
 mod stated;
 mod thumb;
+mod unknown_hand;
 mod weights;
 
 use std::collections::BTreeMap;
@@ -25,13 +27,18 @@ use std::sync::Arc;
 
 use nalgebra::Isometry3;
 
-use crate::WorldError;
+use effort::Effort;
+use fingers::ProposedHand;
+use stated::NoHand;
+pub use unknown_hand::{FingerJoint, UnknownHand};
+
 use crate::description::RobotModel;
 use crate::gripper::between_fingers;
 use crate::layout::{Named, frame};
+use crate::{GripperFault, WorldError};
 use actcheck_data::RobotProfile;
 
-/// A profile with all roles assigned, and the basis of its guesses.
+/// A profile with all roles assigned, but perhaps those of the hand, and the basis of its guesses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proposal {
     /// The profile.
@@ -40,6 +47,9 @@ pub struct Proposal {
     pub notes: BTreeMap<&'static str, String>,
     /// Links of the robot that carry other hands.
     pub other_hands: Vec<String>,
+    /// The end of the arm if no gripper was found there: the profile has no fingers and no grasp
+    /// frame then.
+    pub unknown_hand: Option<UnknownHand>,
 }
 
 /// A frame on a link, by its index: the pose of the grasp relative to the link.
@@ -47,12 +57,16 @@ type GraspFrame = (usize, Isometry3<f64>);
 
 /// Openings narrower than this are measured between other parts than fingertips. Unit: metres.
 const LEAST_OPENING_M: f64 = 0.02;
+/// Most other hands whose arms are parked.
+const MOST_OTHER_HANDS: usize = 4;
 
 /// Proposes a profile for a robot without roles, whose meshes are convex. Of several hands, it
-/// takes one with `hand` in the name of a link or joint of its arm.
+/// takes one with `hand` in the name of a link or joint of its arm. Without a gripper on an arm, the
+/// roles of the hand are left open. Its work is limited in steps, so that the same robot gets the
+/// same proposal on every machine.
 ///
 /// # Errors
-/// [`WorldError`] if the URDF can't be used, or no gripper is found.
+/// [`WorldError`] if the URDF can't be used, has no arm, or no hand with that name.
 pub fn propose(bare: &RobotProfile, hand: Option<&str>) -> Result<Proposal, WorldError> {
     find(bare, true, hand)
 }
@@ -73,7 +87,7 @@ pub fn is_incomplete(profile: &RobotProfile) -> bool {
 /// grasp frame, opening, camera, home and postures. Without a base, the profile's robot is fixed.
 ///
 /// # Errors
-/// As [`propose`].
+/// As [`propose`], and [`WorldError`] if no gripper is found.
 pub fn complete(partial: &RobotProfile) -> Result<Proposal, WorldError> {
     find(partial, false, None)
 }
@@ -81,10 +95,48 @@ pub fn complete(partial: &RobotProfile) -> Result<Proposal, WorldError> {
 /// Finds the roles that a profile leaves out; its base, mount and head too if `all`.
 fn find(partial: &RobotProfile, all: bool, wanted: Option<&str>) -> Result<Proposal, WorldError> {
     let name = partial.urdf.name.to_string();
-    let (model, hand) = thumb::find(partial, wanted).map_err(|error| error.named(&name))?;
+    let mut effort = Effort::whole();
+    let found = thumb::find(partial, wanted, &mut effort);
+    let (model, hand, unknown_hand) = match found {
+        Ok((model, hand)) => (model, hand, None),
+        Err(NoHand::Gripper(fault)) if all && leaves_a_gap(&fault) => {
+            let (model, hand, unknown) =
+                unknown_hand::find(partial, wanted, fault).map_err(|error| error.named(&name))?;
+            (model, hand, Some(unknown))
+        }
+        Err(error) => return Err(error.named(&name)),
+    };
+    let mut proposal = assembled(partial, all, (&model, hand), &mut effort)?;
+    if unknown_hand.is_some() {
+        proposal.profile = unknown_hand::without_placeholder(proposal.profile, partial);
+        proposal.unknown_hand = unknown_hand;
+    }
+    Ok(proposal)
+}
+
+/// Whether a profile can be proposed in spite of this fault, with a gap for the hand.
+fn leaves_a_gap(fault: &GripperFault) -> bool {
+    matches!(
+        fault,
+        GripperFault::NoNames
+            | GripperFault::Stiff { .. }
+            | GripperFault::NoShapes(_)
+            | GripperFault::NoOpposition
+            | GripperFault::CutShort
+    )
+}
+
+/// The proposal with this hand.
+fn assembled(
+    partial: &RobotProfile,
+    all: bool,
+    (model, hand): (&RobotModel, ProposedHand),
+    effort: &mut Effort,
+) -> Result<Proposal, WorldError> {
+    let name = partial.urdf.name.to_string();
     let mut notes = hand.notes;
     let mut profile = hand.profile;
-    let body = body::find(&model, hand.palm, &hand.others, &mut notes);
+    let body = body::find(model, hand.palm, &hand.others, &mut notes);
     let joint_names = |joints: &[usize]| {
         joints
             .iter()
@@ -146,7 +198,7 @@ fn find(partial: &RobotProfile, all: bool, wanted: Option<&str>) -> Result<Propo
         short_arm::measure_reach(&mut profile, &model, grasp, &mut notes)?;
     }
     if all {
-        let others = parked(partial, &profile, &hand.others, &mut notes);
+        let others = parked(partial, &profile, &hand.others, &mut notes, effort);
         profile.parked.extend(others);
     }
     // Joints without a role are rigid from now on: a finger that no named joint moves may narrow
@@ -162,6 +214,7 @@ fn find(partial: &RobotProfile, all: bool, wanted: Option<&str>) -> Result<Propo
         profile,
         notes,
         other_hands: hand.others,
+        unknown_hand: None,
     })
 }
 
@@ -172,6 +225,7 @@ fn parked(
     own: &RobotProfile,
     others: &[String],
     notes: &mut BTreeMap<&'static str, String>,
+    effort: &mut Effort,
 ) -> Vec<(String, f64)> {
     let own: Vec<&String> = own
         .base_joints
@@ -182,10 +236,12 @@ fn parked(
         .collect();
     let mut parked: Vec<(String, f64)> = Vec::new();
     let mut hands = Vec::new();
-    for other in others {
-        let Ok(found) = home_of(bare, other) else {
-            continue;
-        };
+    for (place, other) in others.iter().enumerate().take(MOST_OTHER_HANDS) {
+        let n_left = others.len().min(MOST_OTHER_HANDS) - place;
+        let mut part = effort.part(n_left);
+        let found = home_of(bare, other, &mut part);
+        effort.join(&part);
+        let Ok(found) = found else { continue };
         let known = parked.len();
         for (joint, position) in found.arm_joints.into_iter().zip(found.home) {
             if !own.contains(&&joint) && parked.iter().all(|(known, _)| *known != joint) {
@@ -217,10 +273,15 @@ fn parked(
 }
 
 /// A profile for the hand at a link, without one for the other hands.
-fn home_of(bare: &RobotProfile, palm: &str) -> Result<RobotProfile, WorldError> {
+fn home_of(
+    bare: &RobotProfile,
+    palm: &str,
+    effort: &mut Effort,
+) -> Result<RobotProfile, WorldError> {
     let name = bare.urdf.name.to_string();
     let model = thumb::without_roles(bare).map_err(|error| error.named(&name))?;
-    let hand = fingers::find(bare, &model, Some(palm)).map_err(|error| error.named(&name))?;
+    let hand =
+        fingers::find(bare, &model, Some(palm), effort).map_err(|error| error.named(&name))?;
     let mut notes = BTreeMap::new();
     let body = body::find(&model, hand.palm, &hand.others, &mut notes);
     let arm_joints = body

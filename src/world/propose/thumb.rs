@@ -4,6 +4,7 @@
 use std::collections::BTreeSet;
 
 use super::body::chain;
+use super::effort::Effort;
 use super::fingers::{self, ProposedHand};
 use super::hands::groups;
 use super::stated::NoHand;
@@ -33,9 +34,12 @@ const CLEARLY: f64 = 1.1;
 pub(super) fn find(
     partial: &RobotProfile,
     wanted: Option<&str>,
+    effort: &mut Effort,
 ) -> Result<(RobotModel, ProposedHand), NoHand> {
     let model = without_roles(partial)?;
-    let at_zero = fingers::find(partial, &model, wanted);
+    let mut part = effort.part(2);
+    let at_zero = fingers::find(partial, &model, wanted, &mut part);
+    effort.join(&part);
     let is_stated = !partial.finger_joints.is_empty()
         || !partial.finger_links[0].is_empty()
         || !partial.grasp_link.is_empty()
@@ -52,7 +56,8 @@ pub(super) fn find(
         .flat_map(|palm| turned(&model, palm))
         .collect();
     let mut best = at_zero.map(|hand| (model, hand));
-    for (joint, position) in thumbs {
+    let n_thumbs = thumbs.len();
+    for (place, (joint, position)) in thumbs.into_iter().enumerate() {
         let thumb = (joint.clone(), position);
         let other_model = with_rigid(partial, vec![thumb.clone()])?;
         let parked = partial.parked.iter().cloned().chain([thumb]).collect();
@@ -60,9 +65,10 @@ pub(super) fn find(
             parked,
             ..partial.clone()
         };
-        let Ok(mut other) = fingers::find(&with_thumb, &other_model, wanted) else {
-            continue;
-        };
+        let mut part = effort.part(n_thumbs - place);
+        let other = fingers::find(&with_thumb, &other_model, wanted, &mut part);
+        effort.join(&part);
+        let Ok(mut other) = other else { continue };
         if best
             .as_ref()
             .is_ok_and(|(_, known)| other.score < CLEARLY * known.score)
