@@ -104,6 +104,7 @@ mod rules_library;
 mod scenario;
 mod schedulers;
 mod schema;
+mod sdf_models;
 mod search;
 mod second_judge;
 mod segments;

@@ -125,6 +125,41 @@ pub fn mujoco() -> Option<&'static Path> {
     made(python, "MuJoCo and robosuite from PyPI").map(PathBuf::as_path)
 }
 
+/// A program that prints models as libsdformat reads them, compiled from `tests/foreign` and cached
+/// beside the build output. Returns `None` without a compiler or Debian's `libsdformat-dev`.
+pub fn sdformat() -> Option<&'static Path> {
+    static PROGRAM: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    let program = PROGRAM.get_or_init(|| {
+        let wanted = root().join("tests/foreign/sdf_models.cc");
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("sdformat");
+        let program = folder.join("sdf_models");
+        kept(&folder, &wanted, |folder| {
+            std::fs::create_dir_all(folder).map_err(|error| error.to_string())?;
+            let flags = flags_of_sdformat()?;
+            run(Command::new("c++")
+                .args(["-std=c++17", "-O1", "-o"])
+                .arg(&program)
+                .arg(&wanted)
+                .args(flags.split_whitespace()))
+        })?;
+        Ok(program)
+    });
+    made(program, "Debian's libsdformat-dev").map(PathBuf::as_path)
+}
+
+/// The flags with which programs that use libsdformat are compiled, for the version that is
+/// installed.
+fn flags_of_sdformat() -> Result<String, String> {
+    let flags = (12..=16).find_map(|version| {
+        let mut command = Command::new("pkg-config");
+        command.args(["--cflags", "--libs", &format!("sdformat{version}")]);
+        let output = command.output().ok()?;
+        let text = String::from_utf8(output.stdout).ok()?;
+        output.status.success().then_some(text)
+    });
+    flags.ok_or_else(|| "pkg-config finds no sdformat12 to sdformat16".to_owned())
+}
+
 /// Allure's own generator from npm, as `tests/foreign/package.json` pins it, cached beside the
 /// build output. Returns `None` if it can't be installed.
 pub fn allure() -> Option<&'static Path> {

@@ -264,6 +264,39 @@ pub(crate) fn included<'a>(
     }
 }
 
+/// The text of a model's file.
+pub(crate) struct ModelText {
+    pub(crate) path: PathBuf,
+    pub(crate) source: Source,
+}
+
+/// Returns the text of the model that a URI in a file means; `None` if there is no such model.
+///
+/// # Errors
+/// Its file is unreadable (W030), or its `model.config` names none (W033).
+pub(crate) fn text_of(
+    uri: &str,
+    file: &Path,
+    lookup: &Lookup,
+) -> Result<Option<ModelText>, Diagnostics> {
+    let as_path = || {
+        let path = lookup.resolve(uri, file).ok()?;
+        let found = model_file(lookup.files, &path).or_else(|| {
+            let is_file = is_model(lookup.files, &path) && lookup.files.read(&path).is_ok();
+            is_file.then(|| path.clone())
+        })?;
+        Some(Found {
+            name: uri.to_owned(),
+            path: found,
+        })
+    };
+    let Some(found) = named(&name_in(uri), lookup).or_else(as_path) else {
+        return Ok(None);
+    };
+    let Opened { path, text, .. } = Opened::of(&found, lookup)?;
+    Ok(Some(ModelText { path, source: text }))
+}
+
 /// Finds a model by its path in the folders. Names of web addresses may differ from folders in case
 /// and spaces.
 fn named(name: &str, lookup: &Lookup) -> Option<Found> {

@@ -261,7 +261,7 @@ fn primitive<'n>(
 const AROUND: u32 = 24;
 
 /// Returns a cone as a mesh, with its tip above and its middle at the origin. Units: metres.
-fn cone(radius: f64, length: f64) -> Option<Mesh> {
+pub(super) fn cone(radius: f64, length: f64) -> Option<Mesh> {
     let mut vertices = vec![[0.0, 0.0, length / 2.0], [0.0, 0.0, -length / 2.0]];
     vertices.extend((0..AROUND).map(|step| {
         let [x, y] = around(step);

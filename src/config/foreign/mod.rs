@@ -37,7 +37,14 @@ mod sdf_inertial;
 mod sdf_joint;
 mod sdf_link;
 mod sdf_pose;
-pub(crate) mod sdf_robot;
+mod sdf_robot;
+mod sdf_robot_include;
+mod sdf_robot_joint;
+mod sdf_robot_link;
+mod sdf_robot_model;
+#[cfg(test)]
+mod sdf_robot_tests;
+mod sdf_robot_tree;
 mod sdf_surface;
 mod solid_mass;
 mod solids;

@@ -21,7 +21,7 @@ use actcheck_base::Span;
 use actcheck_data::PartJoint;
 
 /// Deepest inclusion of models: deeper ones include themselves.
-const DEEPEST: usize = 8;
+pub(super) const DEEPEST: usize = 8;
 /// Of the elements that are read, `allow_auto_disable`, `name` and `origin` have no effect.
 const MODEL: Children = Children {
     read: &[
@@ -552,7 +552,7 @@ fn self_collision(model: Node, reader: &mut Reader) -> Option<Span> {
         .map(xml::span)
 }
 
-fn refuse_static(model: Node, reader: &mut Reader) {
+pub(super) fn refuse_static(model: Node, reader: &mut Reader) {
     let message = "a static model inside one that can move can't be simulated".to_owned();
     let help = "remove its `<static>`, or make the whole model static";
     let node = xml::child(model, "static").unwrap_or(model);

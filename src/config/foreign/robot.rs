@@ -50,7 +50,8 @@ pub(crate) fn read(
             (tree, text, BTreeMap::new(), false)
         }),
         Some("sdf") => {
-            sdf_robot::tree(source).map(|tree| (tree, source.clone(), BTreeMap::new(), false))
+            sdf_robot::read(source, path, lookup, found)
+                .map(|read| (read.tree, read.text, read.faults_of_visuals, false))
         }
         _ => urdf(source, found)
             .map(|read| (read.tree, source.clone(), read.faults_of_visuals, true)),

@@ -94,7 +94,7 @@ fn read_with<T>(
 }
 
 /// Returns the only model of a document.
-fn root_model<'a>(root: Node<'a>, reader: &mut Reader) -> Option<Node<'a>> {
+pub(super) fn root_model<'a>(root: Node<'a>, reader: &mut Reader) -> Option<Node<'a>> {
     check_version(root, reader)?;
     let models: Vec<Node> = xml::children(root, "model").collect();
     match models.as_slice() {

@@ -11,7 +11,7 @@ use actcheck_data::Shape;
 
 /// Density where none is stated, in SDF: that of water. Unit: kg/m³.
 const DENSITY: f64 = 1000.0;
-const INERTIAL: Children = Children {
+pub(super) const INERTIAL: Children = Children {
     read: &["mass", "pose", "inertia", "density", "auto_inertia_params"],
     harmless: &[],
     refused: &["fluid_added_mass"],
@@ -65,7 +65,7 @@ fn of_solids(solids: &[Solid], kg: f64) -> Option<Matrix3<f64>> {
 }
 
 /// Warns of densities in a link whose mass is not computed from them.
-fn warn_of_densities(link: Node, inertial: Option<Node>, reader: &mut Reader) {
+pub(super) fn warn_of_densities(link: Node, inertial: Option<Node>, reader: &mut Reader) {
     let density = xml::children(link, "collision")
         .chain(inertial)
         .find_map(|node| xml::child(node, "density"));
@@ -124,7 +124,7 @@ pub(crate) fn possible(
 
 /// Computes mass, centre and moments of a link from the volumes and densities of its collisions. A
 /// stated mass scales them, as in libsdformat.
-fn computed(inertial: Node, solids: &[Solid], reader: &mut Reader) -> Option<Mass> {
+pub(super) fn computed(inertial: Node, solids: &[Solid], reader: &mut Reader) -> Option<Mass> {
     let usual = match xml::child(inertial, "density") {
         Some(density) => reader.number(density, Bound::Positive)?,
         None => DENSITY,

@@ -8,7 +8,7 @@ use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_data::PartJoint;
 
 /// Limits beyond this are none. Units: metres or radians.
-const UNLIMITED: f64 = 1e6;
+pub(super) const UNLIMITED: f64 = 1e6;
 /// The minor version of SDF 1 from which axes are in the frame of their joint, no longer in that of
 /// the model.
 const OWN_FRAME: u32 = 5;
@@ -37,7 +37,7 @@ const AXIS: Children = Children {
     harmless: &[],
     refused: &["mimic"],
 };
-const DYNAMICS: Children = Children {
+pub(super) const DYNAMICS: Children = Children {
     read: &[
         "damping",
         "friction",
@@ -48,7 +48,7 @@ const DYNAMICS: Children = Children {
     refused: &[],
 };
 /// There is no motor whose effort and speed could have limits.
-const LIMIT: Children = Children {
+pub(super) const LIMIT: Children = Children {
     read: &[
         "lower",
         "upper",

@@ -13,7 +13,7 @@ use actcheck_data::{Part, Pose, Shape};
 
 /// Thickness of the plate that a plane becomes. Unit: metres.
 const PLANE_M: f64 = 0.02;
-const LINK: Children = Children {
+pub(super) const LINK: Children = Children {
     read: &[
         "pose",
         "inertial",
@@ -38,7 +38,7 @@ const LINK: Children = Children {
     ],
     refused: &[],
 };
-const COLLISION: Children = Children {
+pub(super) const COLLISION: Children = Children {
     read: &[
         "pose",
         "geometry",
@@ -119,7 +119,7 @@ fn check_motion(link: Node, name: &str, usual: bool, why: &str, reader: &mut Rea
 }
 
 /// Reports air drag (W035), unless it is zero.
-fn check_drag(decay: Node, reader: &mut Reader) {
+pub(super) fn check_drag(decay: Node, reader: &mut Reader) {
     DECAY.check(decay, reader);
     for name in ["linear", "angular"] {
         let node = xml::child(decay, name);

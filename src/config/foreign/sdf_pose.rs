@@ -209,7 +209,7 @@ fn included<'r>(node: Node, reader: &'r Reader) -> Option<&'r Included> {
         .filter(|_| node.tag_name().name() == "include")
 }
 
-fn name_of(node: Node, reader: &Reader) -> Option<String> {
+pub(super) fn name_of(node: Node, reader: &Reader) -> Option<String> {
     node.attribute("name")
         .or_else(|| xml::child(node, "name").map(xml::text))
         .map(str::to_owned)

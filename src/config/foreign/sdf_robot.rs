@@ -1,47 +1,125 @@
-//! Reads a robot in SDF, Gazebo's format: links, joints, collisions and inertias of one
-//! model.
+//! Reads a robot in SDF, Gazebo's format: a model with the models in it, or the models of a world
+//! that joints connect.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::cell::Cell;
+use std::collections::BTreeMap;
+use std::path::Path;
 
-use nalgebra::{Isometry3, Matrix3};
+use nalgebra::{Isometry3, Vector3};
 
+use crate::foreign::lenient::repaired;
+use crate::foreign::lookup::Lookup;
 use crate::foreign::sdf::check_version;
-use crate::foreign::sdf_joint;
-use crate::foreign::sdf_pose::pose;
-use crate::foreign::xml::{self, Bound, Node, Reader};
-use actcheck_base::{Diagnostics, Source, did_you_mean};
-use actcheck_data::{
-    ModelTree, TreeGeometry, TreeInertial, TreeJoint, TreeLink, TreeMimic, TreeMotion, TreeSolid,
-};
+use crate::foreign::sdf_pose::{self, pose};
+use crate::foreign::sdf_robot_include::{File, Submodels};
+use crate::foreign::sdf_robot_model::{Elements, Group};
+use crate::foreign::sdf_robot_tree;
+use crate::foreign::world::ALWAYS_THERE;
+use crate::foreign::xml::{self, Node, Reader};
+use actcheck_base::{Diagnostics, Source};
+use actcheck_data::ModelTree;
 
-/// Limits beyond this are none. Units: metres or radians.
-const UNLIMITED: f64 = 1e6;
-/// Range of an unlimited sliding joint. Unit: metres.
-const SLIDES_M: f64 = 10.0;
-/// Largest effort and velocity of a joint without them.
-const EFFORT: f64 = 100.0;
-const VELOCITY: f64 = 2.0;
+/// Heights and tilts below this are rounded zeros. Units: metres, radians.
+const ROUNDED: f64 = 1e-9;
 
-/// Reads the tree of a text.
-///
-/// # Errors
-/// Faults of the text: W031 to W035, W051, W055.
-pub(crate) fn tree(source: &Source) -> Result<ModelTree, Diagnostics> {
-    let document = xml::parse_model(source, &source.text)?;
-    let mut reader = Reader::new(source);
-    let root = document.root_element();
-    let tree = convert(root, &mut reader);
-    reader.found.or(())?;
-    Ok(tree.unwrap_or_default())
+/// A robot of an SDF file.
+pub(crate) struct SdfRobot {
+    pub(crate) tree: ModelTree,
+    /// The text, followed by those of included models.
+    pub(crate) text: Source,
+    /// Faults of shapes that are only seen, by link.
+    pub(crate) faults_of_visuals: BTreeMap<String, Diagnostics>,
 }
 
-fn convert(root: Node, reader: &mut Reader) -> Option<ModelTree> {
+/// Reads the robot of a text: its only model, or that with the most moving joints together with
+/// those that joints connect to it. Reports its faults: W031 to W036, W040, W051. The tree has no
+/// links if there is no robot.
+///
+/// # Errors
+/// The text is not XML (W031), or too large (W055).
+pub(crate) fn read(
+    source: &Source,
+    path: &Path,
+    lookup: &Lookup,
+    found: &mut Diagnostics,
+) -> Result<SdfRobot, Diagnostics> {
+    let text = repaired(&source.text);
+    let document = xml::parse_model(source, &text)?;
+    let mut reader = Reader::new(source);
+    let opened = Cell::new(0);
+    let file = File {
+        lookup,
+        path,
+        depth: 0,
+        opened: &opened,
+    };
+    let (name, group) = robot(document.root_element(), &file, &mut reader).unwrap_or_default();
+    let text = match group.texts.as_str() {
+        "" => source.clone(),
+        texts => Source::new(source.name.clone(), format!("{}{texts}", source.text)),
+    };
+    let robot = sdf_robot_tree::assemble(name, group, &mut reader);
+    found.extend(reader.found);
+    Ok(SdfRobot {
+        tree: robot.tree,
+        text,
+        faults_of_visuals: robot.faults_of_visuals,
+    })
+}
+
+/// A model at the top of a file or of a world.
+struct Candidate<'a> {
+    node: Node<'a>,
+    name: String,
+    models: Submodels,
+    found: Diagnostics,
+    n_moving: usize,
+}
+
+impl<'a> Candidate<'a> {
+    /// Reads the models that a model includes, or that an `<include>` names.
+    fn new(node: Node<'a>, file: &File, reader: &mut Reader) -> Self {
+        let (models, found) = reader.aside(|reader| {
+            let mut models = Submodels::default();
+            models.read(node, file, reader);
+            models
+        });
+        let own = node
+            .descendants()
+            .filter(|inner| inner.has_tag_name("joint") && inner.attribute("type") != Some("fixed"))
+            .count();
+        Self {
+            node,
+            name: sdf_pose::name_of(node, reader).unwrap_or_default(),
+            n_moving: own + models.n_moving(),
+            models,
+            found,
+        }
+    }
+}
+
+/// Reads the robot of a document, with its name.
+fn robot(root: Node, file: &File, reader: &mut Reader) -> Option<(String, Group)> {
     check_version(root, reader)?;
-    let models = root
-        .descendants()
-        .filter(|node| node.tag_name().name() == "model");
-    let robot = models.max_by_key(|model| xml::children(*model, "joint").count());
-    let Some(model) = robot else {
+    let mut worlds = xml::children(root, "world");
+    let world = worlds.next();
+    if let Some(second) = worlds.next() {
+        let message = "the file contains more than one world".to_owned();
+        reader.error("W032", second, message, "give each a file of its own");
+    }
+    let container = world.unwrap_or(root);
+    let is_robot = |node: &Node| match node.tag_name().name() {
+        "model" => true,
+        "include" => !is_always_there(*node),
+        _ => false,
+    };
+    let mut candidates: Vec<Candidate> = container
+        .children()
+        .filter(is_robot)
+        .map(|node| Candidate::new(node, file, reader))
+        .collect();
+    let joints: Vec<Node> = xml::children(container, "joint").collect();
+    let Some(chosen) = choose(&candidates, &joints, reader) else {
         reader.error(
             "W032",
             root,
@@ -50,304 +128,127 @@ fn convert(root: Node, reader: &mut Reader) -> Option<ModelTree> {
         );
         return None;
     };
-    let mut links: BTreeMap<&str, (Node, Isometry3<f64>)> = BTreeMap::new();
-    for link in xml::children(model, "link") {
-        let name = reader.attribute(link, "name")?;
-        links.insert(name, (link, pose(link, reader)?));
-    }
-    if links.is_empty() {
-        reader.error(
-            "W051",
-            model,
-            "the robot has no links".to_owned(),
-            "add `<link name=\"base_link\"/>`",
-        );
-        return None;
-    }
-    // The frame of a link in URDF is that of its joint.
-    let mut frames: BTreeMap<&str, Isometry3<f64>> =
-        links.iter().map(|(name, (_, at))| (*name, *at)).collect();
-    let mut joints: Vec<(Node, &str, &str)> = Vec::new();
-    for joint in xml::children(model, "joint") {
-        let (parent, child) = (end(joint, "parent", reader)?, end(joint, "child", reader)?);
-        let is_unknown = |name: &&str| *name != "world" && !links.contains_key(name);
-        if let Some(name) = [parent, child].into_iter().find(is_unknown) {
-            let help = did_you_mean(name, links.keys().copied());
-            reader.error("W051", joint, format!("there is no link `{name}`"), help);
-            return None;
-        }
-        if parent == "world" {
-            continue;
-        }
-        if let Some((_, at)) = links.get(child) {
-            frames.insert(child, at * pose(joint, reader)?);
-        }
-        joints.push((joint, parent, child));
-    }
-    let mut out = ModelTree {
-        name: model.attribute("name").unwrap_or("robot").to_owned(),
-        ..ModelTree::default()
+    let name = candidates[chosen[0]].name.clone();
+    leave_others(&candidates, &chosen, &name, reader);
+    // The robot is in the frame of its first model: a scene places the whole.
+    let base = candidates[chosen[0]].node;
+    warn_of_pose(base, reader);
+    let to_robot = match world {
+        Some(_) => pose(base, reader).unwrap_or_default().inverse(),
+        None => Isometry3::identity(),
     };
-    for (name, (link, at)) in &links {
-        let shift = frames[name].inverse() * at;
-        out.links.push(read_link(*link, name, &shift, reader)?);
-    }
-    for (joint, parent, child) in &joints {
-        out.joints.push(read_joint(
-            *joint,
-            [parent, child],
-            [&frames[parent], &frames[child]],
+    let mut elements = Elements::default();
+    for idx in &chosen {
+        let candidate = &mut candidates[*idx];
+        reader.found.extend(std::mem::take(&mut candidate.found));
+        elements
+            .models
+            .extend(std::mem::take(&mut candidate.models));
+        let prefix = match world {
+            Some(_) => sdf_pose::prefix(candidate.node, reader),
+            None => String::new(),
+        };
+        elements.add(
+            candidate.node,
+            &to_robot,
+            (world.is_some(), &prefix),
             reader,
-        )?);
+        );
     }
-    tie_roots(&links, &joints, &frames, &mut out);
-    Some(out)
+    if world.is_some() {
+        let names: Vec<&str> = chosen
+            .iter()
+            .map(|idx| candidates[*idx].name.as_str())
+            .collect();
+        let own = joints.iter().filter(|joint| {
+            ends(**joint, reader)
+                .iter()
+                .flatten()
+                .any(|end| names.contains(&end.as_str()))
+        });
+        let own: Vec<Node> = own.copied().collect();
+        elements.add_joints(&own, &to_robot);
+    }
+    let mut group = elements.into_group(file, reader);
+    if chosen.len() == 1 && (world.is_some() || base.has_tag_name("include")) {
+        group.rename(&format!("{name}::"));
+    }
+    Some((name, group))
 }
 
-/// Links without a joint above them are fixed to the first of them, as parts of the same base.
-fn tie_roots(
-    links: &BTreeMap<&str, (Node, Isometry3<f64>)>,
-    joints: &[(Node, &str, &str)],
-    frames: &BTreeMap<&str, Isometry3<f64>>,
-    out: &mut ModelTree,
-) {
-    let moved: BTreeSet<&str> = joints.iter().map(|(.., child)| *child).collect();
-    // The one with the most joints below it is the robot.
-    let mut roots: Vec<&str> = links
-        .keys()
-        .copied()
-        .filter(|name| !moved.contains(name))
+/// Whether an `<include>` is that of the floor or the light.
+fn is_always_there(include: Node) -> bool {
+    let uri = xml::child(include, "uri").map_or("", xml::text);
+    let last = uri.trim_end_matches('/').rsplit('/').next();
+    let last = last.unwrap_or_default().to_lowercase().replace(' ', "_");
+    ALWAYS_THERE.contains(&last.as_str())
+}
+
+/// The models at the ends of a joint of a world.
+fn ends(joint: Node, reader: &Reader) -> [Option<String>; 2] {
+    ["parent", "child"].map(|which| {
+        let named = xml::text(xml::child(joint, which)?);
+        let link = sdf_pose::carrier(joint, named, reader).unwrap_or(named.to_owned());
+        link.split_once("::").map(|(model, _)| model.to_owned())
+    })
+}
+
+/// Returns the models that joints of the world connect to the one with the most moving joints. The
+/// first is the one that carries the others.
+fn choose(candidates: &[Candidate], joints: &[Node], reader: &Reader) -> Option<Vec<usize>> {
+    let position = |name: &String| candidates.iter().position(|one| one.name == *name);
+    let pairs: Vec<[usize; 2]> = joints
+        .iter()
+        .filter_map(|joint| {
+            let [parent, child] = ends(*joint, reader);
+            Some([position(&parent?)?, position(&child?)?])
+        })
         .collect();
-    roots.sort_by_key(|root| {
-        std::cmp::Reverse(
-            joints
-                .iter()
-                .filter(|(_, parent, _)| parent == root)
-                .count(),
-        )
-    });
-    let Some((root, others)) = roots.split_first() else {
+    let mut group_of: Vec<usize> = (0..candidates.len()).collect();
+    for [first, second] in &pairs {
+        let (kept, other) = (group_of[*first], group_of[*second]);
+        for group in &mut group_of {
+            if *group == other {
+                *group = kept;
+            }
+        }
+    }
+    let members = |group: usize| (0..candidates.len()).filter(move |idx| group_of[*idx] == group);
+    let moving = |group: usize| -> usize {
+        let idxs = members.clone()(group);
+        idxs.map(|idx| candidates[idx].n_moving).sum()
+    };
+    let best =
+        (0..candidates.len()).max_by_key(|group| (moving(*group), std::cmp::Reverse(*group)))?;
+    let mut chosen: Vec<usize> = members(best).collect();
+    let is_carried = |idx: &usize| pairs.iter().any(|[_, child]| child == idx);
+    chosen.sort_by_key(|idx| (is_carried(idx), *idx));
+    Some(chosen)
+}
+
+/// Warns of models that are not part of the robot (W036).
+fn leave_others(candidates: &[Candidate], chosen: &[usize], robot: &str, reader: &mut Reader) {
+    for (idx, other) in candidates.iter().enumerate() {
+        if !chosen.contains(&idx) {
+            let message = format!("`{}` is left out: the robot is `{robot}`", other.name);
+            let help = "no joint connects them; furniture belongs in a world of `model_dir`";
+            reader.warning("W036", other.node, message, help);
+        }
+    }
+}
+
+/// Warns of a height or tilt of the whole robot (W036), which scenes and profiles give it.
+fn warn_of_pose(model: Node, reader: &mut Reader) {
+    let Some(element) = xml::child(model, "pose") else {
         return;
     };
-    for other in others {
-        let origin = frames[root].inverse() * frames[other];
-        let place = out.link(other).map(|link| link.place.clone());
-        out.joints.push(TreeJoint::fixed(
-            format!("{other}_fixed"),
-            [root, other],
-            origin,
-            place.unwrap_or_default(),
-        ));
+    let (Some(at), _) = reader.aside(|reader| pose(model, reader)) else {
+        return;
+    };
+    let tilt = (at.rotation * Vector3::z() - Vector3::z()).norm();
+    if at.translation.z.abs() > ROUNDED || tilt > ROUNDED {
+        let message = "the height and tilt of the whole robot are left out".to_owned();
+        let help = "a robot stands on the floor; a profile mounts it with `mount_height_m`";
+        reader.warning("W036", element, message, help);
     }
-}
-
-fn end<'a>(joint: Node<'a>, which: &str, reader: &mut Reader) -> Option<&'a str> {
-    reader.required(joint, which).map(xml::text)
-}
-
-fn read_link(
-    link: Node,
-    name: &str,
-    shift: &Isometry3<f64>,
-    reader: &mut Reader,
-) -> Option<TreeLink> {
-    let mut solids = Vec::new();
-    for collision in xml::children(link, "collision") {
-        let at = shift * pose(collision, reader)?;
-        let geometry = reader.required(collision, "geometry")?;
-        solids.push(TreeSolid {
-            pose: at,
-            geometry: shape(geometry, reader)?,
-            matter: None,
-            friction: None,
-            place: reader.place(collision),
-        });
-    }
-    let inertial = match xml::child(link, "inertial") {
-        Some(node) => Some(inertial(node, shift, reader)?),
-        None => None,
-    };
-    Some(TreeLink {
-        name: name.to_owned(),
-        inertial,
-        solids,
-        visuals: Vec::new(),
-        place: reader.place(link),
-    })
-}
-
-fn inertial(node: Node, shift: &Isometry3<f64>, reader: &mut Reader) -> Option<TreeInertial> {
-    let at = shift * pose(node, reader)?;
-    let kg = match xml::child(node, "mass") {
-        Some(mass) => reader.number(mass, Bound::Mass)?,
-        None => 1.0,
-    };
-    let mut about_com = Matrix3::identity();
-    if let Some(inertia) = xml::child(node, "inertia") {
-        for (row, column, name) in [
-            (0, 0, "ixx"),
-            (0, 1, "ixy"),
-            (0, 2, "ixz"),
-            (1, 1, "iyy"),
-            (1, 2, "iyz"),
-            (2, 2, "izz"),
-        ] {
-            let Some(written) = xml::child(inertia, name) else {
-                continue;
-            };
-            let value = reader.number(written, Bound::Finite)?;
-            about_com[(row, column)] = value;
-            about_com[(column, row)] = value;
-        }
-    }
-    let inertia = xml::child(node, "inertia");
-    Some(TreeInertial {
-        pose: at,
-        kg,
-        about_com,
-        place: reader.place(xml::child(node, "mass").unwrap_or(node)),
-        moments_place: inertia.map(|inertia| reader.place(inertia)),
-    })
-}
-
-/// Reads the shape of a `<geometry>`.
-fn shape(geometry: Node, reader: &mut Reader) -> Option<TreeGeometry> {
-    let Some(kind) = geometry.children().find(Node::is_element) else {
-        reader.error(
-            "W033",
-            geometry,
-            "`<geometry>` is empty".to_owned(),
-            "add a shape, such as `<box>`",
-        );
-        return None;
-    };
-    let mut number = |name: &str| {
-        let node = reader.required(kind, name)?;
-        reader.number(node, Bound::Length)
-    };
-    Some(match kind.tag_name().name() {
-        "sphere" => TreeGeometry::Sphere {
-            radius: number("radius")?,
-        },
-        "cylinder" => TreeGeometry::Cylinder {
-            radius: number("radius")?,
-            length: number("length")?,
-        },
-        "capsule" => TreeGeometry::Capsule {
-            radius: number("radius")?,
-            length: number("length")?,
-        },
-        "box" => {
-            let size = reader.required(kind, "size")?;
-            TreeGeometry::Box {
-                size: reader.numbers(size, xml::text(size), Bound::Length)?,
-            }
-        }
-        "ellipsoid" => {
-            let radii = reader.required(kind, "radii")?;
-            TreeGeometry::Ellipsoid {
-                radii: reader.numbers(radii, xml::text(radii), Bound::Length)?,
-            }
-        }
-        "mesh" => {
-            let file = reader.required(kind, "uri").map(xml::text)?.to_owned();
-            let scale = match xml::child(kind, "scale") {
-                Some(scale) => reader.numbers(scale, xml::text(scale), Bound::Finite)?,
-                None => [1.0; 3],
-            };
-            TreeGeometry::Mesh { file, scale }
-        }
-        other => {
-            let message = format!("the shape {other} can't be part of a robot");
-            reader.error(
-                "W035",
-                kind,
-                message,
-                "use a box, cylinder, capsule, ellipsoid, sphere or mesh",
-            );
-            return None;
-        }
-    })
-}
-
-fn read_joint(
-    joint: Node,
-    ends: [&str; 2],
-    [from, to]: [&Isometry3<f64>; 2],
-    reader: &mut Reader,
-) -> Option<TreeJoint> {
-    let name = reader.attribute(joint, "name")?;
-    let origin = from.inverse() * to;
-    let fixed = TreeJoint::fixed(name.to_owned(), ends, origin, reader.place(joint));
-    let motion = match reader.attribute(joint, "type")? {
-        "fixed" => return Some(fixed),
-        "revolute" => TreeMotion::Revolute,
-        "continuous" => TreeMotion::Continuous,
-        "prismatic" => TreeMotion::Prismatic,
-        other => {
-            let message =
-                format!("the joint `{name}` is of the type {other}, which can't be simulated");
-            reader.error(
-                "W035",
-                joint,
-                message,
-                "use revolute, continuous, prismatic or fixed",
-            );
-            return None;
-        }
-    };
-    let axis = reader.required(joint, "axis")?;
-    let direction = to.rotation.inverse() * sdf_joint::direction(joint, axis, to.rotation, reader)?;
-    let limits = xml::child(axis, "limit");
-    let mut limit =
-        |name: &str, otherwise: f64| match limits.and_then(|limits| xml::child(limits, name)) {
-            Some(node) => reader.number(node, Bound::Finite),
-            None => Some(otherwise),
-        };
-    let range = [limit("lower", -1e16)?, limit("upper", 1e16)?];
-    let (effort, velocity) = (limit("effort", EFFORT)?, limit("velocity", VELOCITY)?);
-    let damping = xml::child(axis, "dynamics").and_then(|dynamics| xml::child(dynamics, "damping"));
-    let damping = match damping {
-        Some(node) => reader.number(node, Bound::NotNegative)?,
-        None => 0.0,
-    };
-    let is_open = range.iter().any(|end| end.abs() > UNLIMITED);
-    let (motion, [lower, upper]) = match (is_open, motion) {
-        (true, TreeMotion::Prismatic) => (motion, [-SLIDES_M, SLIDES_M]),
-        (true, _) | (_, TreeMotion::Continuous) => {
-            (TreeMotion::Continuous, [f64::NEG_INFINITY, f64::INFINITY])
-        }
-        (false, _) => (motion, range),
-    };
-    // Negative values mean that there is none.
-    let stated = |value: f64, otherwise: f64| if value > 0.0 { value } else { otherwise };
-    Some(TreeJoint {
-        motion,
-        axis: direction,
-        lower,
-        upper,
-        effort: stated(effort, EFFORT),
-        velocity: stated(velocity, VELOCITY),
-        damping,
-        mimic: mimic(axis, reader),
-        ..fixed
-    })
-}
-
-/// The joint that a joint follows, in SDF 1.11 and later.
-fn mimic(axis: Node, reader: &mut Reader) -> Option<TreeMimic> {
-    let mimic = xml::child(axis, "mimic")?;
-    let leader = mimic.attribute("joint")?.to_owned();
-    let mut number = |name: &str, otherwise: f64| match xml::child(mimic, name) {
-        Some(node) => reader.number(node, Bound::Finite).unwrap_or(otherwise),
-        None => otherwise,
-    };
-    let (factor, offset) = (number("multiplier", 1.0), number("offset", 0.0));
-    let offset = offset - factor * number("reference", 0.0);
-    Some(TreeMimic {
-        leader,
-        factor,
-        offset,
-        place: reader.place(mimic),
-    })
 }

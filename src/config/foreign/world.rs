@@ -53,7 +53,7 @@ const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 /// Files round gravity, and it differs between places on Earth. Unit: m/s².
 const GRAVITY_TOLERANCE: f64 = 0.1;
 /// Included models to skip: every world already has a floor and light.
-const ALWAYS_THERE: [&str; 2] = ["ground_plane", "sun"];
+pub(super) const ALWAYS_THERE: [&str; 2] = ["ground_plane", "sun"];
 /// A model that is tilted by more than this gets a model of its own. Unit: cosine.
 const UPRIGHT_COSINE: f64 = 0.999;
 

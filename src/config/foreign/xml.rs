@@ -203,6 +203,18 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// Calls a function whose faults are not reported but returned with its result.
+    pub(crate) fn aside<T>(&mut self, read: impl FnOnce(&mut Self) -> T) -> (T, Diagnostics) {
+        let mut apart = Self {
+            pieces: self.pieces.clone(),
+            included: std::mem::take(&mut self.included),
+            ..Self::new(self.source)
+        };
+        let result = read(&mut apart);
+        self.included = apart.included;
+        (result, apart.found)
+    }
+
     /// Returns the place of an element, in the file that contains it.
     pub(crate) fn place(&self, node: Node) -> SourceSpan {
         self.located(node.range())

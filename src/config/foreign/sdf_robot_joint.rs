@@ -1,0 +1,206 @@
+//! Reads the joints of robots in SDF.
+
+use std::f64::consts::TAU;
+
+use nalgebra::UnitQuaternion;
+
+use crate::foreign::elements::{Children, refuse_unless};
+use crate::foreign::sdf_joint::{self, DYNAMICS, LIMIT, UNLIMITED};
+use crate::foreign::xml::{self, Bound, Node, Reader};
+use actcheck_data::{TreeJoint, TreeMimic, TreeMotion};
+
+/// Range of a sliding joint without a limit at one end or at both. Unit: metres.
+const SLIDES_M: f64 = 10.0;
+/// Range of a turning joint with a limit at one end only. Unit: radians.
+const TURNS_RAD: f64 = 10.0 * TAU;
+
+const JOINT: Children = Children {
+    read: &["parent", "child", "pose", "axis", "origin"],
+    // The limits and damping in `<physics>` are those of other solvers, with their own defaults;
+    // the others belong to kinds of joints that are errors.
+    harmless: &[
+        "sensor",
+        "physics",
+        "axis2",
+        "gearbox_ratio",
+        "gearbox_reference_body",
+        "thread_pitch",
+        "screw_thread_pitch",
+    ],
+    refused: &["mimic"],
+};
+const AXIS: Children = Children {
+    read: &[
+        "xyz",
+        "use_parent_model_frame",
+        "limit",
+        "dynamics",
+        "initial_position",
+        "mimic",
+    ],
+    harmless: &[],
+    refused: &[],
+};
+const MIMIC: Children = Children {
+    read: &["multiplier", "offset", "reference"],
+    harmless: &[],
+    refused: &[],
+};
+
+/// Reads the motion of a joint; `fixed` is one with its name and place. `own`: the orientation of
+/// the joint in its model. Its axis is in the frame of this model. Returns `None` after it has
+/// reported a fault.
+pub(crate) fn read(
+    joint: Node,
+    fixed: TreeJoint,
+    own: UnitQuaternion<f64>,
+    reader: &mut Reader,
+) -> Option<TreeJoint> {
+    JOINT.check(joint, reader);
+    reader.attribute(joint, "type")?;
+    let axis = xml::child(joint, "axis");
+    let is_coupled = axis.is_some_and(|axis| xml::child(axis, "mimic").is_some());
+    if sdf_joint::is_rigid(joint) && !is_coupled {
+        return Some(fixed);
+    }
+    let kind = sdf_joint::kind(joint, reader)?;
+    let axis = reader.required(joint, "axis")?;
+    AXIS.check(axis, reader);
+    let why = "a joint begins at 0";
+    refuse_unless(axis, "initial_position", 0.0, why, reader);
+    let direction = sdf_joint::direction(joint, axis, own, reader)?;
+    let Some(direction) = direction.try_normalize(1e-9) else {
+        let message = format!("the axis of the joint `{}` must not be zero", fixed.name);
+        let help = "write, for example, `<xyz>0 0 1</xyz>`";
+        reader.error("W034", axis, message, help);
+        return None;
+    };
+    let limits = xml::child(axis, "limit");
+    if let Some(limits) = limits {
+        LIMIT.check(limits, reader);
+    }
+    let [lower, upper] = ["lower", "upper"].map(|name| limit(limits, name, reader));
+    let [effort, velocity] = ["effort", "velocity"].map(|name| limit(limits, name, reader));
+    // Negative values mean that there is none; 0 means here that it is unknown.
+    let [effort, velocity] =
+        [effort?, velocity?].map(|most| most.map_or(0.0, |most| most.max(0.0)));
+    let range = [lower?, upper?];
+    let (motion, [lower, upper]) = match (kind, range) {
+        ("prismatic", range) => (
+            TreeMotion::Prismatic,
+            bounded(joint, range, SLIDES_M, reader),
+        ),
+        ("continuous", _) | (_, [None, None]) => {
+            (TreeMotion::Continuous, [f64::NEG_INFINITY, f64::INFINITY])
+        }
+        (_, range) => (
+            TreeMotion::Revolute,
+            bounded(joint, range, TURNS_RAD, reader),
+        ),
+    };
+    if lower > upper {
+        let name = &fixed.name;
+        let message = format!(
+            "the joint `{name}` has a lower limit of {lower} above its upper limit of {upper}"
+        );
+        reader.error("W034", axis, message, "exchange the limits");
+        return None;
+    }
+    let [damping, friction] = resistance(axis, reader)?;
+    Some(TreeJoint {
+        motion,
+        axis: direction,
+        lower,
+        upper,
+        effort,
+        velocity,
+        damping,
+        friction,
+        mimic: mimic(axis, reader)?,
+        ..fixed
+    })
+}
+
+/// Reads a limit: `Some(None)` if there is none, `None` after a fault.
+#[expect(clippy::option_option, reason = "a fault and a missing limit differ")]
+fn limit(limits: Option<Node>, name: &str, reader: &mut Reader) -> Option<Option<f64>> {
+    let Some(node) = limits.and_then(|limits| xml::child(limits, name)) else {
+        return Some(None);
+    };
+    if xml::text(node).parse::<f64>().is_ok_and(f64::is_infinite) {
+        return Some(None);
+    }
+    let value = reader.number(node, Bound::Finite)?;
+    Some(Some(value).filter(|value| value.abs() <= UNLIMITED))
+}
+
+/// Returns limits with both ends. Warns of a missing one (W036).
+fn bounded(joint: Node, range: [Option<f64>; 2], most: f64, reader: &mut Reader) -> [f64; 2] {
+    let found = match range {
+        [Some(lower), Some(upper)] => return [lower, upper],
+        [Some(lower), None] => [lower, lower.max(0.0) + most],
+        [None, Some(upper)] => [upper.min(0.0) - most, upper],
+        [None, None] => [-most, most],
+    };
+    let name = joint.attribute("name").unwrap_or_default();
+    let message = format!(
+        "the joint `{name}` has an end without a limit: it moves from {:.3} to {:.3}",
+        found[0], found[1]
+    );
+    reader.warning("W036", joint, message, "write both limits");
+    found
+}
+
+/// Reads damping and dry friction. Reports a spring (W035).
+fn resistance(axis: Node, reader: &mut Reader) -> Option<[f64; 2]> {
+    let Some(dynamics) = xml::child(axis, "dynamics") else {
+        return Some([0.0; 2]);
+    };
+    DYNAMICS.check(dynamics, reader);
+    let why = "joints have no springs";
+    refuse_unless(dynamics, "spring_stiffness", 0.0, why, reader);
+    let [damping, friction] =
+        ["damping", "friction"].map(|name| match xml::child(dynamics, name) {
+            Some(node) => reader.number(node, Bound::NotNegative),
+            None => Some(0.0),
+        });
+    Some([damping?, friction?])
+}
+
+/// Reads the joint that a joint follows, in SDF 1.11 and later: `Some(None)` if it follows none,
+/// `None` after a fault.
+#[expect(
+    clippy::option_option,
+    reason = "a fault and a missing coupling differ"
+)]
+fn mimic(axis: Node, reader: &mut Reader) -> Option<Option<TreeMimic>> {
+    let Some(mimic) = xml::child(axis, "mimic") else {
+        return Some(None);
+    };
+    MIMIC.check(mimic, reader);
+    let leader = reader.attribute(mimic, "joint")?.to_owned();
+    if mimic.attribute("axis").is_some_and(|axis| axis != "axis") {
+        let message = "a coupling to the second axis of a joint can't be simulated".to_owned();
+        reader.error("W035", mimic, message, "name a joint with a single axis");
+        return None;
+    }
+    let mut number = |name: &str, otherwise: f64| match xml::child(mimic, name) {
+        Some(node) => reader.number(node, Bound::Finite),
+        None => Some(otherwise),
+    };
+    let (factor, offset) = (number("multiplier", 1.0)?, number("offset", 0.0)?);
+    let offset = offset - factor * number("reference", 0.0)?;
+    Some(Some(TreeMimic {
+        leader,
+        factor,
+        offset,
+        place: reader.place(mimic),
+    }))
+}
+
+/// Whether a plugin makes a joint follow another, as that of `roboticsgroup_gazebo_plugins` does.
+pub(crate) fn is_coupling(plugin: Node) -> bool {
+    ["joint", "mimicJoint"]
+        .iter()
+        .all(|name| xml::child(plugin, name).is_some())
+}

@@ -1,0 +1,294 @@
+//! Reads the links of robots in SDF: their masses and shapes.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{Isometry3, Matrix3};
+
+use crate::foreign::body::Role;
+use crate::foreign::elements::{Children, refuse_switch};
+use crate::foreign::geometry::{KINDS, Shapes, cone, kind_of};
+use crate::foreign::sdf_inertial::{self, INERTIAL, Solid};
+use crate::foreign::sdf_link::{COLLISION, LINK, check_drag};
+use crate::foreign::sdf_pose::pose;
+use crate::foreign::sdf_robot_include::File;
+use crate::foreign::sdf_robot_model::LinkAt;
+use crate::foreign::sdf_surface::Surface;
+use crate::foreign::xml::{self, Bound, Node, Reader};
+use actcheck_data::{Mesh, Shape, TreeGeometry, TreeInertial, TreeLink, TreeSolid};
+
+/// Mass of a link without one, in SDF; its moments are those of 1 kg·m². Unit: kilograms.
+const USUAL_KG: f64 = 1.0;
+const MESH: Children = Children {
+    read: &["uri", "scale"],
+    harmless: &["convex_decomposition"],
+    refused: &["submesh"],
+};
+
+/// Reads a link, at the origin. Shapes without a mesh file get entries in `meshes`.
+pub(crate) fn read(
+    link: Node,
+    name: &str,
+    file: &File,
+    meshes: &mut BTreeMap<String, Mesh>,
+    reader: &mut Reader,
+) -> LinkAt {
+    LINK.check(link, reader);
+    check_motion(link, reader);
+    let mut solids = Vec::new();
+    for collision in xml::children(link, "collision") {
+        COLLISION.check(collision, reader);
+        // Wheels have frictions that depend on the direction; a robot here does not drive by them.
+        let surface = Surface::of(collision, Role::Furniture, reader);
+        if surface
+            .restitution
+            .is_some_and(|restitution| restitution > 0.0)
+        {
+            let message = "a robot's link that bounces can't be simulated".to_owned();
+            let node = xml::child(collision, "surface").unwrap_or(collision);
+            reader.error("W035", node, message, "remove its `<bounce>`");
+        }
+        let solid = solid(collision, name, file, meshes, reader);
+        solids.extend(solid.map(|solid| {
+            (
+                collision,
+                TreeSolid {
+                    friction: surface.friction,
+                    ..solid
+                },
+            )
+        }));
+    }
+    let (visuals, faults) = reader.aside(|reader| {
+        let visuals = xml::children(link, "visual");
+        let visuals = visuals.filter_map(|visual| solid(visual, name, file, meshes, reader));
+        visuals.collect::<Vec<_>>()
+    });
+    let collides = xml::child(link, "self_collide").and_then(|node| reader.boolean(node));
+    let inertial = inertial(link, &solids, file, reader);
+    LinkAt {
+        at: Isometry3::identity(),
+        link: TreeLink {
+            name: name.to_owned(),
+            inertial,
+            solids: solids.into_iter().map(|(_, solid)| solid).collect(),
+            visuals,
+            place: reader.place(link),
+        },
+        model: String::new(),
+        collides,
+        faults_of_visuals: Some(faults).filter(|faults| !faults.is_empty()),
+        has_no_mass: xml::child(link, "inertial").is_none(),
+    }
+}
+
+/// Reports motions by other forces than a robot's motors (W035).
+fn check_motion(link: Node, reader: &mut Reader) {
+    let why = "a kinematic link can't be simulated";
+    refuse_switch(link, "kinematic", false, why, reader);
+    if let Some(decay) = xml::child(link, "velocity_decay") {
+        check_drag(decay, reader);
+    }
+    if let Some(gravity) = xml::child(link, "gravity")
+        && reader.boolean(gravity) == Some(false)
+    {
+        let message = "`<gravity>` of a robot's link is ignored".to_owned();
+        let help = "the model works without it: motors carry the weight of their robot";
+        reader.warning("W036", gravity, message, help);
+    }
+}
+
+/// Reads a shape; `None` if it has none, or after a fault.
+fn solid(
+    node: Node,
+    link: &str,
+    file: &File,
+    meshes: &mut BTreeMap<String, Mesh>,
+    reader: &mut Reader,
+) -> Option<TreeSolid> {
+    let pose = pose(node, reader);
+    let geometry = reader.required(node, "geometry")?;
+    let kind = kind_of(geometry, reader)?;
+    if kind.tag_name().name() == "empty" {
+        return None;
+    }
+    let geometry = match kind.tag_name().name() {
+        "cone" => {
+            let cone = cone(
+                number(kind, "radius", reader)?,
+                number(kind, "length", reader)?,
+            )?;
+            let name = node.attribute("name").unwrap_or_default();
+            let name = format!("{link} {name} ({})", meshes.len());
+            meshes.insert(name.clone(), cone);
+            TreeGeometry::Mesh {
+                file: name,
+                scale: [1.0; 3],
+            }
+        }
+        _ => shape(kind, file, reader)?,
+    };
+    Some(TreeSolid {
+        pose: pose?,
+        geometry,
+        matter: None,
+        friction: None,
+        place: reader.place(kind),
+    })
+}
+
+fn number(kind: Node, name: &str, reader: &mut Reader) -> Option<f64> {
+    let node = reader.required(kind, name)?;
+    reader.number(node, Bound::Length)
+}
+
+fn three(kind: Node, name: &str, reader: &mut Reader) -> Option<[f64; 3]> {
+    let node = reader.required(kind, name)?;
+    reader.numbers(node, xml::text(node), Bound::Length)
+}
+
+fn shape(kind: Node, file: &File, reader: &mut Reader) -> Option<TreeGeometry> {
+    match kind.tag_name().name() {
+        "sphere" => number(kind, "radius", reader).map(|radius| TreeGeometry::Sphere { radius }),
+        "box" => three(kind, "size", reader).map(|size| TreeGeometry::Box { size }),
+        "ellipsoid" => three(kind, "radii", reader).map(|radii| TreeGeometry::Ellipsoid { radii }),
+        round @ ("cylinder" | "capsule") => {
+            let [radius, length] = ["radius", "length"].map(|name| number(kind, name, reader));
+            let (radius, length) = (radius?, length?);
+            Some(match round {
+                "cylinder" => TreeGeometry::Cylinder { radius, length },
+                _ => TreeGeometry::Capsule { radius, length },
+            })
+        }
+        "mesh" => {
+            MESH.check(kind, reader);
+            let uri = reader.required(kind, "uri").map(xml::text)?;
+            let scale = match xml::child(kind, "scale") {
+                Some(scale) => reader.numbers(scale, xml::text(scale), Bound::Finite)?,
+                None => [1.0; 3],
+            };
+            if scale.contains(&0.0) {
+                let message = "the mesh's scale must not be 0".to_owned();
+                reader.error("W034", kind, message, "write 1 for the file's own size");
+                return None;
+            }
+            Some(TreeGeometry::Mesh {
+                file: file.mesh(uri),
+                scale,
+            })
+        }
+        other => {
+            let message = format!("the shape {other} can't be part of a robot");
+            reader.error("W035", kind, message, KINDS);
+            None
+        }
+    }
+}
+
+/// Reads the mass of a link, or computes it from the volumes of its collisions. Returns `None`
+/// after a fault.
+fn inertial(
+    link: Node,
+    solids: &[(Node, TreeSolid)],
+    file: &File,
+    reader: &mut Reader,
+) -> Option<TreeInertial> {
+    let inertial = xml::child(link, "inertial");
+    let is_computed = match inertial {
+        Some(inertial) => reader.boolean_attribute(inertial, "auto")?,
+        None => false,
+    };
+    if is_computed {
+        return computed(inertial?, solids, file, reader);
+    }
+    sdf_inertial::warn_of_densities(link, inertial, reader);
+    match inertial {
+        Some(inertial) => stated(inertial, reader),
+        None => Some(TreeInertial {
+            pose: Isometry3::identity(),
+            kg: USUAL_KG,
+            about_com: Matrix3::identity(),
+            place: reader.place(link),
+            moments_place: None,
+        }),
+    }
+}
+
+fn stated(inertial: Node, reader: &mut Reader) -> Option<TreeInertial> {
+    INERTIAL.check(inertial, reader);
+    let pose = pose(inertial, reader)?;
+    let mass = xml::child(inertial, "mass");
+    let kg = match mass {
+        Some(mass) => reader.number(mass, Bound::Mass)?,
+        None => USUAL_KG,
+    };
+    let inertia = xml::child(inertial, "inertia");
+    let mut about_com = Matrix3::identity();
+    for (row, column, name) in [
+        (0, 0, "ixx"),
+        (0, 1, "ixy"),
+        (0, 2, "ixz"),
+        (1, 1, "iyy"),
+        (1, 2, "iyz"),
+        (2, 2, "izz"),
+    ] {
+        let Some(written) = inertia.and_then(|inertia| xml::child(inertia, name)) else {
+            continue;
+        };
+        let value = reader.number(written, Bound::Finite)?;
+        about_com[(row, column)] = value;
+        about_com[(column, row)] = value;
+    }
+    Some(TreeInertial {
+        pose,
+        kg,
+        about_com,
+        place: reader.place(mass.unwrap_or(inertial)),
+        moments_place: inertia.map(|inertia| reader.place(inertia)),
+    })
+}
+
+fn computed(
+    inertial: Node,
+    solids: &[(Node, TreeSolid)],
+    file: &File,
+    reader: &mut Reader,
+) -> Option<TreeInertial> {
+    INERTIAL.check(inertial, reader);
+    let mut shapes = Shapes::new(file.lookup, file.path);
+    let mut found = Vec::new();
+    for (collision, solid) in solids {
+        let shape = match (&solid.geometry, xml::child(*collision, "geometry")) {
+            (TreeGeometry::Mesh { .. }, Some(geometry)) => shapes.sdf(geometry, reader)?,
+            // The inertia of an ellipsoid follows from its element.
+            (geometry, _) => geometry.solid().unwrap_or(Shape::Box { size: [1.0; 3] }),
+        };
+        found.push(Solid {
+            collision: *collision,
+            shape,
+            at: solid.pose,
+        });
+    }
+    let mass = sdf_inertial::computed(inertial, &found, reader)?;
+    Some(TreeInertial {
+        pose: mass.com.into(),
+        kg: mass.kg,
+        about_com: mass.about_com?,
+        place: reader.place(inertial),
+        moments_place: None,
+    })
+}
+
+/// Renames the meshes of a link that have no file.
+pub(crate) fn rename_meshes(
+    link: &mut TreeLink,
+    meshes: &BTreeMap<String, Mesh>,
+    changed: impl Fn(&str) -> String,
+) {
+    for solid in link.solids.iter_mut().chain(&mut link.visuals) {
+        if let TreeGeometry::Mesh { file, .. } = &mut solid.geometry
+            && meshes.contains_key(file)
+        {
+            *file = changed(file);
+        }
+    }
+}
