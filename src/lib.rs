@@ -26,6 +26,8 @@
 //! | [`config`] | TOML text to a fully checked `Campaign`; models in our own and in third-party formats | toml, roxmltree, mesh-loader, urdf-rs (writer), shlex |
 //! | [`ontology`] | actions, properties, designators, categories and the vocabulary | oxrdf, oxrdfio (parsers) |
 //! | [`scenario`] | recorded choices to one concrete `Scene`; the order of simplicity for shrinking | parry3d (overlaps) |
+//! | [`geometry`] | shapes, hulls, distances and depths | parry3d |
+//! | [`robot`] | a robot compiled from its typed tree: kinematics, inverse kinematics, gripper, dynamics; the proposal of a profile | parry3d |
 //! | [`world`] | a `Scene` to a stepping simulation; the only crate that uses the physics engine | rapier3d, parry3d |
 //! | [`actions`] | the robot's actions through commands and observations; the `Trace` | |
 //! | [`protocol`] | actions performed by an external program, in lockstep over a socket | nix |
@@ -60,6 +62,10 @@ pub use actcheck_config as config;
 pub use actcheck_ontology as ontology;
 
 pub use actcheck_scenario as scenario;
+
+pub use actcheck_geometry as geometry;
+
+pub use actcheck_robot as robot;
 
 pub use actcheck_world as world;
 

@@ -7,14 +7,16 @@ use std::path::{Path, PathBuf};
 
 /// Each crate and the crates that it may depend on, in the order of the pipeline. `cli` may depend
 /// on all.
-const FLOORS: [(&str, &[&str]); 20] = [
+const FLOORS: [(&str, &[&str]); 22] = [
     ("base", &[]),
     ("data", &["base"]),
     ("search", &[]),
     ("config", &["base", "data", "search"]),
     ("ontology", &["base"]),
     ("scenario", &["base", "data", "config", "ontology"]),
-    ("world", &["base", "data", "scenario"]),
+    ("geometry", &["base", "data"]),
+    ("robot", &["base", "data", "geometry"]),
+    ("world", &["base", "data", "scenario", "geometry", "robot"]),
     ("actions", &["base", "data", "scenario", "world"]),
     (
         "protocol",
@@ -58,7 +60,10 @@ const FENCES: [(&str, &[&str]); 34] = [
     ("oxrdf", &["ontology", "rules"]),
     ("oxrdfio", &["ontology", "rules"]),
     ("rapier3d", &["world"]),
-    ("parry3d", &["world", "scenario", "episodes"]),
+    (
+        "parry3d",
+        &["geometry", "robot", "world", "scenario", "episodes"],
+    ),
     ("mcap", &["episodes"]),
     ("prost", &["episodes"]),
     ("pyo3", &["judge"]),

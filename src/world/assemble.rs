@@ -8,13 +8,13 @@ use rapier3d::prelude::{
 };
 
 use crate::WorldError;
-use crate::convert::{to_pose, to_real, to_vector};
-use crate::description::{Joint, JointKind, RobotModel};
 use crate::drive::Law;
 use crate::engine::{Owner, off_floor, same_shape};
-use crate::layout::{Layout, Named};
 use crate::motor::Motor;
 use actcheck_data::RobotProfile;
+use actcheck_geometry::{to_pose, to_real, to_vector};
+use actcheck_robot::{Joint, JointKind, RobotModel};
+use actcheck_robot::{Layout, Named, RobotError};
 
 /// Position error at which a motor reaches its effort limit. Unit: metres. Stiffness is the effort
 /// limit divided by this.
@@ -44,44 +44,6 @@ pub(super) const STOP_DAMPING: f32 = 5.0;
 /// Joint ranges wider than this get no limits in the engine, which saves solver time. Unit: metres
 /// or radians.
 pub(super) const WIDEST_RANGE: f64 = 20.0;
-
-/// Returns the home posture, with the base at its start pose and the fingers half open.
-pub(super) fn home(
-    profile: &RobotProfile,
-    model: &RobotModel,
-    named: &Named,
-    base: [f64; 3],
-) -> Vec<f64> {
-    let mut positions: Vec<f64> = model
-        .joints
-        .iter()
-        .map(|joint| 0.0_f64.clamp(joint.lower, joint.upper))
-        .collect();
-    for (idx, position) in named.layout.arm.iter().zip(&profile.home) {
-        positions[*idx] = position.clamp(model.joints[*idx].lower, model.joints[*idx].upper);
-    }
-    for (idx, position) in named.layout.base.iter().flatten().zip(base) {
-        positions[*idx] = position;
-    }
-    named
-        .layout
-        .gripper
-        .set(&mut positions, profile.max_opening_m / 2.0);
-    for idx in named.layout.gripper.joints() {
-        positions[idx] = positions[idx].clamp(model.joints[idx].lower, model.joints[idx].upper);
-    }
-    for (idx, joint) in model
-        .joints
-        .iter()
-        .enumerate()
-        .filter(|(idx, _)| !named.layout.gripper.contains(*idx))
-    {
-        if let Some((leader, factor, offset)) = joint.mimic {
-            positions[idx] = (factor * positions[leader] + offset).clamp(joint.lower, joint.upper);
-        }
-    }
-    positions
-}
 
 pub(super) fn insert_links(
     engine: &mut PhysicsWorld,
@@ -206,7 +168,7 @@ pub(super) fn insert_joints(
 ) -> Result<Vec<Motor>, WorldError> {
     let mut motors = Vec::with_capacity(model.joints.len());
     for (idx, joint) in model.joints.iter().enumerate() {
-        let handle = insert_joint(engine, joint, idx, bodies).ok_or_else(|| WorldError::Urdf {
+        let handle = insert_joint(engine, joint, idx, bodies).ok_or_else(|| RobotError::Urdf {
             name: profile.urdf.name.to_string(),
             reason: format!("joint `{}` closes a loop", joint.name),
         })?;

@@ -9,9 +9,9 @@ use rapier3d::prelude::{
 };
 
 use crate::World;
-use crate::convert::{to_pose, to_real};
 use crate::object::Object;
 use actcheck_data::{PartJoint, SceneObject};
+use actcheck_geometry::{to_pose, to_real};
 
 /// Gain of the control of velocity that friction is: it acts with its full force at any speed above
 /// a few millimetres per second. Unit: N·s/m per newton, or N·m·s per newton metre.

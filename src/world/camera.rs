@@ -10,10 +10,10 @@ use parry3d::shape::Shape;
 use rapier3d::prelude::Collider;
 
 use crate::World;
-use crate::convert::{from_pose, to_real, to_vector};
 use crate::engine::{Owner, SHELL};
-use crate::rays::{Lens, RayScene};
 use actcheck_data::{Camera, ChoiceName, Choices, Look, Pose, Stream};
+use actcheck_geometry::{Lens, RayScene};
+use actcheck_geometry::{from_pose, to_real, to_vector};
 
 /// Distance from the lens within which the camera does not see its own link: housings surround
 /// their lens, and their convex hulls close its opening. Unit: metres.

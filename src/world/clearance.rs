@@ -10,12 +10,12 @@ use rapier3d::prelude::{Collider, RigidBodyHandle};
 
 use crate::World;
 use crate::contacts::Touch;
-use crate::convert::{from_pose, from_vector, to_vector};
 use crate::engine::Owner;
 use crate::object::Object;
 use crate::robot_course::ROUNDING_M;
-use crate::self_contact::Turned;
 use actcheck_data::Clearance;
+use actcheck_geometry::Turned;
+use actcheck_geometry::{from_pose, from_vector, to_vector};
 
 /// Objects farther away than this are not measured. Unit: metres. An arm's reach.
 const RANGE_M: f64 = 0.5;
@@ -154,10 +154,10 @@ fn turned_boxes_apart(one: &Collider, other: &Collider) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::convert::to_pose;
     use crate::object;
     use crate::robot::tests::lonely;
     use actcheck_data::{Choices, ObjectModel, Part, Pose, Role, SceneObject, Shape};
+    use actcheck_geometry::to_pose;
     use nalgebra::{Isometry3, Vector3};
     use rapier3d::prelude::{ColliderBuilder, SharedShape};
     use std::sync::Arc;
@@ -243,11 +243,11 @@ mod tests {
         let hulls: Vec<_> = (0..3)
             .map(|_| {
                 let mut number =
-                    || crate::convert::to_real(choices.real("at".into(), -0.06, 0.06, 0.0));
+                    || actcheck_geometry::to_real(choices.real("at".into(), -0.06, 0.06, 0.0));
                 let corners: Vec<Vector> = (0..20)
                     .map(|_| Vector::new(number(), number(), number()))
                     .collect();
-                crate::hull::Hull::of(&corners).expect("the corners are not in a plane")
+                actcheck_geometry::Hull::of(&corners).expect("the corners are not in a plane")
             })
             .collect();
         let links = [4, 6];

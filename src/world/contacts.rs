@@ -9,10 +9,10 @@ use rapier3d::prelude::{
 };
 
 use crate::World;
-use crate::convert::{from_pose, from_vector};
 use crate::engine::Owner;
-use crate::inertia::Twist;
 use crate::ownership::Ownership;
+use actcheck_geometry::{from_pose, from_vector};
+use actcheck_robot::Twist;
 
 /// Contact forces below this are solver noise: a tenth of the weight of the lightest shipped model.
 /// Unit: newtons.

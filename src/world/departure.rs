@@ -12,9 +12,9 @@ use nalgebra::Vector3;
 use rapier3d::prelude::RigidBodyType;
 
 use crate::contacts::Touch;
-use crate::convert::from_vector;
 use crate::engine::Owner;
 use crate::{Fault, World, fault};
+use actcheck_geometry::from_vector;
 
 /// No object that a robot moves is faster. Unit: m/s. A blow by a link at 4 m/s, faster than most
 /// arms, gives a light ball 8 m/s, and a fall from 1.5 m adds 3.4 m/s.

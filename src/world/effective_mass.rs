@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use crate::inertia::{Twist, inertias};
 use crate::robot::Robot;
+use actcheck_robot::{Twist, inertias};
 
 /// Length of the push: a substep of the default physics. Unit: seconds.
 const PUSH_SECS: f64 = 1.0 / 960.0;
@@ -48,7 +48,7 @@ impl Robot {
 
 #[cfg(test)]
 mod tests {
-    use crate::gripper::tests::{hand, turning};
+    use crate::gripper_tests::{hand, turning};
     use crate::robot::tests::alone;
     use actcheck_base::Files;
     use std::path::Path;

@@ -8,11 +8,11 @@ use rapier3d::prelude::{
     SpringCoefficients,
 };
 
-use crate::convert::{to_pose, to_real, to_vector};
-use crate::hull::Hull;
-use crate::kinematics::GRAVITY;
 use crate::{WorldError, fault, fresh};
-use actcheck_data::{Part, Physics, Shape};
+use actcheck_data::{Part, Physics};
+use actcheck_geometry::{Hull, convex_shape};
+use actcheck_geometry::{to_pose, to_real, to_vector};
+use actcheck_robot::GRAVITY;
 
 /// The owner of a collider.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -151,30 +151,10 @@ pub fn collider(
     friction: f64,
     restitution: f64,
 ) -> Option<ColliderBuilder> {
-    let mut pose = solid.pose.to_isometry();
-    let builder = match &solid.shape {
-        Shape::Box { size: [x, y, z] } => {
-            ColliderBuilder::cuboid(to_real(x / 2.0), to_real(y / 2.0), to_real(z / 2.0))
-        }
-        Shape::Cylinder { radius, height } => {
-            // The axis of the engine's cylinders is y.
-            pose.rotation *= nalgebra::UnitQuaternion::from_axis_angle(
-                &Vector3::x_axis(),
-                std::f64::consts::FRAC_PI_2,
-            );
-            ColliderBuilder::cylinder(to_real(height / 2.0), to_real(*radius))
-        }
-        Shape::Sphere { radius } => ColliderBuilder::ball(to_real(*radius)),
-        Shape::Capsule { radius, height } => {
-            ColliderBuilder::capsule_z(to_real(height / 2.0), to_real(*radius))
-        }
-        Shape::Hull { points, .. } => hull(points)?,
-        Shape::Mesh { mesh } => hull(&mesh.vertices)?,
-        Shape::Tube { .. } => return None,
-    };
+    let (shape, pose) = convex_shape(solid)?;
     Some(with_surface(
-        builder
-            .position(to_pose(&pose))
+        ColliderBuilder::new(shape)
+            .position(pose)
             .restitution(to_real(restitution)),
         owner,
         friction,
@@ -207,15 +187,6 @@ fn with_surface(builder: ColliderBuilder, owner: Owner, friction: f64) -> Collid
         .friction(to_real(friction))
         .friction_combine_rule(CoefficientCombineRule::GeometricMean)
         .user_data(owner.to_tag())
-}
-
-/// Returns the convex hull of points, or `None` if they lie in a plane.
-fn hull(points: &[[f64; 3]]) -> Option<ColliderBuilder> {
-    let points: Vec<_> = points
-        .iter()
-        .map(|point| to_vector(&Vector3::from(*point)))
-        .collect();
-    Some(ColliderBuilder::new(SharedShape::new(Hull::of(&points)?)))
 }
 
 #[cfg(test)]

@@ -10,10 +10,10 @@ use rapier3d::prelude::PhysicsWorld;
 
 use crate::assemble::{STOP_DAMPING, STOP_FREQUENCY_HZ, WIDEST_RANGE};
 use crate::drive::VelocityConstraint;
-use crate::factor::Factor;
-use crate::inertia::{Inertias, Twist, inertias};
 use crate::ownership::{Hand, Ownership};
 use crate::robot::Robot;
+use actcheck_robot::Factor;
+use actcheck_robot::{Inertias, Twist, inertias};
 
 /// Impulse per error of velocity of a coupling between two joints: nearly rigid. Unit: kilograms or
 /// kg·m².

@@ -15,10 +15,10 @@ use parry3d::query::{
 use parry3d::shape::{PackedFeatureId, PolygonalFeature, Shape};
 use rapier3d::prelude::{ContactData, ContactManifoldData, NarrowPhase};
 
-use crate::convert::{from_vector, to_real, to_vector};
-use crate::hull::Hull;
-use crate::neighbours::Neighbours;
-use crate::separation::{Separation, SeparationOutcome, SolidPair};
+use actcheck_geometry::Hull;
+use actcheck_geometry::Neighbours;
+use actcheck_geometry::{Separation, SeparationOutcome, SolidPair};
+use actcheck_geometry::{from_vector, to_real, to_vector};
 
 /// Creates a narrow phase that does not reuse contact points from the previous step, and computes
 /// those of hulls and cylinders in 64 bits.
@@ -305,7 +305,7 @@ mod tests {
         use parry3d::shape::Cylinder;
         use rapier3d::prelude::Rotation;
 
-        use crate::link_pairs::SURE_M;
+        use actcheck_geometry::SURE_M;
 
         let mut choices = Choices::random(21, 0);
         let mut number = |most: f64| to_real(choices.real("at".into(), -most, most, 0.0));

@@ -14,11 +14,11 @@ use rapier3d::prelude::{
 
 use crate::World;
 use crate::contacts::Touch;
-use crate::convert::{from_vector, to_pose, to_real};
 use crate::engine::{Owner, off_floor};
-use crate::kinematics::GRAVITY;
 use crate::object::Object;
 use actcheck_data::Role;
+use actcheck_geometry::{from_vector, to_pose, to_real};
+use actcheck_robot::GRAVITY;
 
 /// Furniture slower than this has stopped. Unit: m/s and rad/s.
 const STOPPED: f64 = 2e-3;

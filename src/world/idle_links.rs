@@ -53,8 +53,8 @@ mod tests {
     use rapier3d::prelude::RigidBodyHandle;
 
     use super::*;
-    use crate::convert::from_pose;
     use crate::robot::tests::{alone, lonely};
+    use actcheck_geometry::from_pose;
 
     /// The shipped robot with a forearm of many pieces.
     fn with_pieces() -> World {

@@ -11,17 +11,15 @@ use rapier3d::prelude::{
 };
 
 use crate::World;
-use crate::convert::{from_vector, to_real};
 use crate::engine::{FLOOR_GROUP, LENGTH_UNIT, Owner};
 use crate::object::Object;
 use crate::robot_course::TOUCH_M;
+use actcheck_geometry::SURE_M;
+use actcheck_geometry::{from_vector, to_real};
 use parry3d::math::Vector;
 
 /// Number of collision groups for links.
 const LINK_GROUPS: u32 = 30;
-/// Contacts nearer than this are kept at any speed: a link at rest can't move farther in a step.
-/// Unit: metres.
-pub(super) const SURE_M: Real = 1.5e-3;
 /// Factor on the present speed, which motors change within the step.
 const OVERSHOOT: Real = 2.0;
 /// A collision group without links: objects are in all groups, and links collide with this one.
@@ -216,7 +214,7 @@ impl World {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gripper::tests::{hand, turning};
+    use crate::gripper_tests::{hand, turning};
     use crate::robot::tests::alone;
     use actcheck_base::Source;
 

@@ -3,9 +3,9 @@
 use rapier3d::prelude::{GenericJoint, JointAxis, MultibodyJointHandle, PhysicsWorld};
 
 use crate::assemble::WIDEST_RANGE;
-use crate::convert::to_real;
-use crate::description::Joint;
 use crate::drive::{Law, State};
+use actcheck_geometry::to_real;
+use actcheck_robot::Joint;
 
 /// The motor of one joint.
 #[derive(Debug, Clone)]

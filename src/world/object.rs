@@ -9,12 +9,12 @@ use rapier3d::prelude::{
 };
 
 use crate::attach::Attachment;
-use crate::convert::{to_pose, to_real, to_vector};
 use crate::engine::{LENGTH_UNIT, Owner, collider};
 use crate::furniture::slides;
-use crate::proximity::Ball;
 use crate::shell::{Hollow, hollows_of};
 use actcheck_data::{Inertia, ObjectModel, Part, Role, SceneObject};
+use actcheck_geometry::Ball;
+use actcheck_geometry::{to_pose, to_real, to_vector};
 
 /// A body slower than this may fall asleep. Unit: m/s of its farthest point.
 const SLEEP_SPEED: f32 = 0.02;

@@ -5,10 +5,10 @@ use std::collections::BTreeSet;
 use nalgebra::Point3;
 
 use crate::World;
-use crate::convert::from_vector;
 use crate::engine::Owner;
 use crate::object::Object;
 use actcheck_data::{BodyState, LinkState, Pose, RobotState, Snapshot};
+use actcheck_geometry::from_vector;
 
 /// Share of a body's weight that a contact must carry for the body to rest on it. Low enough for
 /// several supports.
@@ -49,7 +49,7 @@ impl World {
         let pose = self.pose_of(object);
         let mut touching = BTreeSet::new();
         let mut carriers = BTreeSet::new();
-        let enough = CARRIED_SHARE * object.mass_kg * crate::kinematics::GRAVITY;
+        let enough = CARRIED_SHARE * object.mass_kg * actcheck_robot::GRAVITY;
         for pair in pairs {
             let (other, lift) = match (pair.first, pair.second) {
                 (other, Owner::Object(own)) if own == idx => (other, pair.lift_on_second_n),

@@ -8,10 +8,10 @@ use rapier3d::prelude::Collider;
 
 use crate::World;
 use crate::clearance::{Boxed, gap};
-use crate::convert::{from_pose, to_vector};
 use crate::engine::FLOOR_GROUP;
 use crate::object::Object;
-use crate::separation::{SeparationOutcome, SolidPair};
+use actcheck_geometry::{SeparationOutcome, SolidPair};
+use actcheck_geometry::{from_pose, to_vector};
 
 /// Depth up to which things touch and do not overlap. Unit: metres. Contacts are up to 1.8 mm deep
 /// in a firm grasp, and the colliders of wheels and feet are as much larger than these.
@@ -192,7 +192,7 @@ mod tests {
                 Vector::new(across * around.cos(), across * around.sin(), along) * 0.06
             })
             .collect();
-        let hull = crate::hull::Hull::of(&corners).expect("the corners are not in a plane");
+        let hull = actcheck_geometry::Hull::of(&corners).expect("the corners are not in a plane");
         vec![
             SharedShape::cuboid(0.04, 0.05, 0.3),
             SharedShape::cuboid(0.06, 0.06, 0.06),

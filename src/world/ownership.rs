@@ -14,10 +14,10 @@ use rapier3d::prelude::{
 };
 
 use crate::assemble::insert_joint;
-use crate::convert::{from_pose, to_pose, to_real};
-use crate::description::RobotModel;
-use crate::gripper::Gripper;
 use crate::robot::Robot;
+use actcheck_geometry::{from_pose, to_pose, to_real};
+use actcheck_robot::Gripper;
+use actcheck_robot::RobotModel;
 
 /// Inertia of the carrier of a hand: contacts and motors of the fingers change its velocity by less
 /// than a millionth. Units: kilograms and kg·m².

@@ -16,9 +16,9 @@ use rapier3d::prelude::{
 
 use crate::World;
 use crate::contacts::{has_solved, impulse_of, solved};
-use crate::convert::{from_pose, from_vector, to_pose, to_real};
 use crate::engine::Owner;
 use crate::reach::Reach;
+use actcheck_geometry::{from_pose, from_vector, to_pose, to_real};
 
 /// Mean lever of the friction of a pad about the middle of the area that it touches: a choice of
 /// this order. By Hertz, a ball of soft rubber (1.2 MPa, incompressible) with a radius of 4 cm that

@@ -2,9 +2,9 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use crate::convert::{to_pose, to_real, to_vector};
 use crate::{Perturbation, World};
 use actcheck_data::Pose;
+use actcheck_geometry::{to_pose, to_real, to_vector};
 
 /// Gap below an object that is laid down, so that it drops into contact instead of being pushed
 /// out. Unit: metres.

@@ -7,19 +7,20 @@
 //! is measured again only when too little is left. All of this depends on the state of the
 //! simulation alone.
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Vector3};
 use parry3d::bounding_volume::BoundingVolume;
 use parry3d::math::Real;
 
 use crate::World;
 use crate::clearance::{apart, gap, gap_squared};
-use crate::convert::{from_pose, from_vector};
-use crate::description::JointKind;
-use crate::kinematics::{GRAVITY, axis_in_world};
 use crate::link_pairs::PREDICTION_M;
 use crate::object::Object;
 use crate::reach::{Reach, Shortcuts};
 use crate::robot_course::ROUNDING_M;
+use actcheck_geometry::Ball;
+use actcheck_geometry::{from_pose, from_vector};
+use actcheck_robot::JointKind;
+use actcheck_robot::{GRAVITY, axis_in_world};
 
 /// Distances are measured up to this. Unit: metres.
 const RANGE_M: f64 = 0.25;
@@ -87,13 +88,6 @@ impl Measured {
             (self.pose.rotation.inverse() * pose.rotation).imag().norm() * std::f64::consts::PI;
         self.gap_m - shift - turn * ball.radius
     }
-}
-
-/// The bounding ball of a link's shapes, in the link's frame.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Ball {
-    pub(super) middle: Point3<f64>,
-    pub(super) radius: f64,
 }
 
 /// The robot at the beginning of a tick.

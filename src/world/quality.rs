@@ -4,8 +4,8 @@
 
 use crate::World;
 use crate::engine::Owner;
-use crate::kinematics::GRAVITY;
 use actcheck_data::Quality;
+use actcheck_robot::GRAVITY;
 
 /// Measures penetration and energy tick by tick.
 #[derive(Debug, Default)]

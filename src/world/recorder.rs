@@ -8,7 +8,6 @@ use rapier3d::prelude::RigidBodyHandle;
 use crate::World;
 use crate::clearance::ClearanceMeter;
 use crate::contacts::Touch;
-use crate::convert::{from_pose, from_vector};
 use crate::engine::Owner;
 use crate::motion::MotionMeter;
 use crate::quality::QualityMeter;
@@ -16,6 +15,7 @@ use crate::robot_course::RobotMeter;
 use crate::samples::SampleMeter;
 use actcheck_base::Digest;
 use actcheck_data::{Pose, RobotCourse};
+use actcheck_geometry::{from_pose, from_vector};
 
 /// Time between two frames. Unit: seconds. Enough for images and replays, and it keeps traces
 /// small.

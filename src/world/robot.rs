@@ -2,23 +2,22 @@
 
 use std::sync::Arc;
 
-use nalgebra::Isometry3;
 use parry3d::bounding_volume::BoundingSphere;
 use rapier3d::prelude::{MultibodyJointHandle, PhysicsWorld, RigidBody, RigidBodyHandle};
 
-use crate::assemble::{home, insert_joints, insert_links, links_on_floor};
-use crate::description::{Joint, RobotModel};
+use crate::assemble::{insert_joints, insert_links, links_on_floor};
 use crate::drive::{Law, State};
 use crate::effective_mass::{CARRIED_SHARE, LIGHT_KG};
 use crate::free_motion::Equations;
-use crate::inertia::Twist;
-use crate::layout::Layout;
 use crate::motor::Motor;
 use crate::ownership::{Hand, Ownership};
-use crate::proximity::Ball;
-use crate::resolved::{Resolved, resolved};
 use crate::{Kinematics, WorldError};
-use actcheck_data::{JointState, Pose, RobotProfile, RobotStart};
+use actcheck_data::{JointState, RobotProfile, RobotStart};
+use actcheck_geometry::Ball;
+use actcheck_robot::Layout;
+use actcheck_robot::Twist;
+use actcheck_robot::{Joint, RobotModel};
+use actcheck_robot::{Resolved, resolved};
 
 /// The robot, its bodies in the engine, and its joint controllers.
 pub struct Robot {
@@ -34,7 +33,7 @@ pub struct Robot {
     pub layout: Layout,
     /// Links of the fingertips, left and right.
     pub finger_links: [usize; 2],
-    /// All links of the fingers, left and right: see [`Named::fingers`](crate::layout::Named).
+    /// All links of the fingers, left and right: see [`Named::fingers`](actcheck_robot::Named).
     pub fingers: [Vec<usize>; 2],
     pub(super) motors: Vec<Motor>,
     /// Links that do not collide with the floor.
@@ -71,26 +70,6 @@ pub struct Robot {
     pub(super) equations: Option<Box<Equations>>,
 }
 
-/// Returns a robot's geometry, layout and home posture, without a simulation.
-///
-/// # Errors
-/// [`WorldError`] if profile and URDF don't match.
-pub fn geometry(start: &RobotStart) -> Result<(Kinematics, Layout, Vec<f64>), WorldError> {
-    let resolved = resolved(&start.profile)?;
-    let Resolved {
-        model,
-        named,
-        passing,
-        hand,
-    } = resolved.as_ref();
-    let positions = home(&start.profile, model, named, start.base);
-    let root = root_of(start, &named.layout);
-    let kinematics = Kinematics::new(Arc::clone(model), root, named.grasp, named.camera)
-        .with_passing(passing.clone(), hand.clone())
-        .with_followers(&named.layout.gripper);
-    Ok((kinematics, named.layout.clone(), positions))
-}
-
 fn balls_of_shapes(engine: &PhysicsWorld, body: RigidBodyHandle) -> Vec<BoundingSphere> {
     let handles = engine
         .bodies
@@ -105,21 +84,6 @@ fn balls_of_shapes(engine: &PhysicsWorld, body: RigidBodyHandle) -> Vec<Bounding
         .collect()
 }
 
-/// Pose of the root link. Frame: world.
-fn root_of(start: &RobotStart, layout: &Layout) -> Isometry3<f64> {
-    let [x, y, heading] = start.base;
-    match layout.base {
-        // The root of a mobile robot is above the world's origin, which is the frame of its
-        // odometry.
-        Some(_) => Isometry3::translation(0.0, 0.0, start.root_height_m),
-        None => Pose::upright(
-            [x, y, start.root_height_m],
-            heading + start.profile.mount_turned_rad,
-        )
-        .to_isometry(),
-    }
-}
-
 impl Robot {
     /// Inserts the robot into the engine, in its home posture.
     ///
@@ -129,7 +93,7 @@ impl Robot {
         let profile = start.profile.clone();
         let resolved = resolved(&profile)?;
         let Resolved { model, named, .. } = resolved.as_ref();
-        let (kinematics, _, positions) = geometry(start)?;
+        let (kinematics, _, positions) = actcheck_robot::geometry(start)?;
         let bodies = insert_links(
             engine,
             model,
@@ -440,11 +404,11 @@ pub(super) mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::convert::from_pose;
-    use crate::layout::check_robot;
     use crate::{World, build, ik};
     use actcheck_base::Files;
     use actcheck_data::{Camera, Choices, Odometry, Physics, Scene, Sensing};
+    use actcheck_geometry::from_pose;
+    use actcheck_robot::check_robot;
 
     pub(crate) fn lonely() -> World {
         let path = Path::new("models/robots/mobile_manipulator.toml");

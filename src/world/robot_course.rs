@@ -13,9 +13,9 @@ use rapier3d::prelude::{Collider, RigidBodyHandle};
 
 use crate::World;
 use crate::contacts::Touch;
-use crate::convert::{from_pose, from_vector};
 use crate::engine::{Owner, SHELL};
 use crate::reach::Reach;
+use actcheck_geometry::{from_pose, from_vector};
 
 /// Control ticks between two self-collision checks. At 60 ticks per second, that is 20 checks per
 /// second: a link at 1 m/s moves 5 cm between them.
@@ -94,6 +94,17 @@ impl RobotMeter {
 }
 
 impl World {
+    /// Returns the pose of a link in the frame of another one.
+    pub fn pose_between(&self, first: usize, second: usize) -> Option<Isometry3<f64>> {
+        let pose = |link: usize| {
+            self.engine
+                .bodies
+                .get(self.robot.bodies[link])
+                .map(|body| from_pose(body.position()))
+        };
+        Some(pose(first)?.inverse() * pose(second)?)
+    }
+
     /// Resets the measurement.
     pub(super) fn begin_robot_course(&mut self) {
         self.recorder.robot.begin(self.robot.model.joints.len());
@@ -226,7 +237,7 @@ impl World {
             if met.get(&pair).is_some_and(|known| known.is_known(&between)) {
                 continue;
             }
-            let depth = self.solid_depth_of(first, second, &between);
+            let depth = self.robot.model.solid_depth_m(first, second, &between);
             if depth > TOUCH_M || met.contains_key(&pair) {
                 let known = met.entry(pair).or_insert(LinksMet::at(now));
                 known.max_depth_m = known.max_depth_m.max(depth);

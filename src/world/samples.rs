@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 
 use crate::World;
 use crate::contacts::Touch;
-use crate::convert::{from_pose, from_vector};
 use crate::engine::Owner;
 use crate::object::Object;
 use actcheck_data::{Pose, Samples, Series};
+use actcheck_geometry::{from_pose, from_vector};
 
 const POSE: [&str; 7] = ["x", "y", "z", "qx", "qy", "qz", "qw"];
 const VELOCITY: [&str; 6] = ["vx", "vy", "vz", "wx", "wy", "wz"];

@@ -1,7 +1,7 @@
 //! Lets a new scene come to rest.
 
 use crate::World;
-use crate::convert::from_vector;
+use actcheck_geometry::from_vector;
 
 /// Time limit. Unit: seconds. Objects fall a few millimetres; a rolling object is detected within
 /// this time.

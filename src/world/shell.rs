@@ -11,10 +11,10 @@ use parry3d::shape::Cylinder;
 use rapier3d::prelude::{Collider, ColliderBuilder, ColliderHandle, Pose, RigidBody};
 
 use crate::World;
-use crate::convert::{from_pose, from_vector, to_pose, to_real};
 use crate::engine::SHELL;
 use crate::reach::Reach;
 use actcheck_data::{Part, Pose as PartPose, Shape};
+use actcheck_geometry::{from_pose, from_vector, to_pose, to_real};
 
 /// Largest change of a tube's radius for its height. In wider cones the staves differ from their
 /// shell.

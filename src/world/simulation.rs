@@ -9,7 +9,6 @@ use nalgebra::{Isometry3, Vector3};
 use rapier3d::prelude::{PhysicsWorld, RigidBodyHandle};
 
 use crate::attach::attach;
-use crate::convert::{from_pose, from_vector, to_vector};
 use crate::departure::Motions;
 use crate::engine::{Owner, add_floor, engine};
 use crate::furniture::Sliding;
@@ -24,6 +23,7 @@ use crate::robot::Robot;
 use crate::suction::Cup;
 use crate::{Fault, Kinematics, Layout, Poison, WorldError, fault};
 use actcheck_data::{CONTROL_HZ, Camera, KnownKind, Pose, RobotProfile, Scene, Sensing};
+use actcheck_geometry::{from_pose, from_vector, to_vector};
 use actcheck_scenario::FloorPlan;
 
 /// A command to the robot's controllers. Positions are clamped to the joint limits; the controllers

@@ -1,8 +1,8 @@
 //! How far the joints can move in a control tick: a bound from their speeds and their motors.
 
-use crate::description::Joint;
 use crate::motor::Motor;
 use crate::robot::Robot;
+use actcheck_robot::Joint;
 
 impl Robot {
     /// Returns how far each joint can move in a control tick: at its speed now or at that of its

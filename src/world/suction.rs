@@ -13,9 +13,9 @@ use rapier3d::prelude::{
 
 use crate::World;
 use crate::contacts::{CONTACT_FLOOR_NEWTONS, Touch};
-use crate::convert::{from_vector, to_pose, to_real, to_vector};
 use crate::engine::{Owner, collider};
 use actcheck_data::{CupState, ObjectModel, Part, Pose, Suction};
+use actcheck_geometry::{from_vector, to_pose, to_real, to_vector};
 
 /// Distance of a surface from the lip that the soft lip bridges. Unit: metres. A few millimetres
 /// for cups of some centimetres.

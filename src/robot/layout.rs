@@ -1,0 +1,258 @@
+//! Resolves the joints and links of a profile in the URDF.
+
+use std::collections::BTreeSet;
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+use crate::assumed::{UNKNOWN_EFFORT, UNKNOWN_SPEEDS};
+use crate::description::RobotModel;
+use crate::gripper::{Probe, links_of_fingers};
+use crate::kinematics::Mount;
+use crate::wrist;
+use crate::{BalancedJoint, Gripper, GripperFault, RobotError};
+use actcheck_data::RobotProfile;
+
+/// Indices of the robot's joints by their role.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layout {
+    /// Base: x, y, heading; `None` if it is fixed.
+    pub base: Option<[usize; 3]>,
+    /// Arm, in the profile's order.
+    pub arm: Vec<usize>,
+    /// Head: pan, tilt.
+    pub head: Vec<usize>,
+    /// Joints of the fingers.
+    pub gripper: Gripper,
+}
+
+/// Tolerance of `max_opening_m`, which is often rounded. Unit: metres.
+const OPENING_SLACK_M: f64 = 2e-3;
+
+/// The profile's joints and links, resolved in the URDF.
+pub struct Named {
+    /// The joints by role.
+    pub layout: Layout,
+    /// The fingertips, left and right.
+    pub finger_links: [usize; 2],
+    /// All links of each finger, left and right, with the fingertips.
+    pub fingers: [Vec<usize>; 2],
+    /// The grasp frame: its merged link, and the pose in that link's frame.
+    pub grasp: (usize, Isometry3<f64>),
+    /// The place of the camera.
+    pub camera: Mount,
+}
+
+impl Named {
+    /// Finds the joints and links that a profile names.
+    ///
+    /// # Errors
+    /// [`RobotError`] for the first missing or unsupported one.
+    pub fn find(profile: &RobotProfile, model: &RobotModel) -> Result<Self, RobotError> {
+        let joints = |names: &[String]| {
+            names
+                .iter()
+                .map(|name| model.joint(name))
+                .collect::<Result<Vec<_>, _>>()
+        };
+        let base = match &profile.base_joints {
+            Some([x, y, heading]) => {
+                Some([model.joint(x)?, model.joint(y)?, model.joint(heading)?])
+            }
+            None => None,
+        };
+        let [left_link, right_link] = &profile.finger_links;
+        let grasp = frame(
+            model,
+            &profile.grasp_link,
+            profile.grasp_offset_m,
+            profile.grasp_turned_rad,
+        )?;
+        let camera = camera(model, profile)?;
+        let finger_links = [model.frame(left_link)?.0, model.frame(right_link)?.0];
+        let layout = Layout {
+            base,
+            arm: joints(&profile.arm_joints)?,
+            head: joints(&profile.head_joints)?,
+            gripper: Gripper::find(profile, model, finger_links, grasp)?,
+        };
+        let probe = Probe::new(model, finger_links, grasp);
+        let fingers = links_of_fingers(model, &layout.gripper, &probe);
+        Ok(Self {
+            layout,
+            finger_links,
+            fingers,
+            grasp,
+            camera,
+        })
+    }
+
+    /// Returns the pairs of links that pass through each other, with the smaller index first: those
+    /// of the hand, but not the two fingertips, and those of a wrist, because their convex shapes
+    /// overlap where the real ones do not; and those that the file names.
+    pub fn passing(&self, model: &RobotModel) -> BTreeSet<(usize, usize)> {
+        let all = self.links_of_hand(model);
+        let [left, right] = self.finger_links;
+        let pairs = all
+            .iter()
+            .flat_map(|first| all.range(first + 1..).map(|second| (*first, *second)));
+        let of_gripper = pairs.filter(|pair| *pair != (left.min(right), left.max(right)));
+        of_gripper
+            .chain(wrist::passing(model))
+            .chain(model.passing.iter().copied())
+            .collect()
+    }
+
+    /// Returns the links of the gripper's mechanism, those that carry them, and the hand's other
+    /// fingers.
+    pub(crate) fn links_of_hand(&self, model: &RobotModel) -> BTreeSet<usize> {
+        let gripper = &self.layout.gripper;
+        let palms: BTreeSet<usize> = gripper
+            .joints()
+            .map(|joint| model.joints[joint].parent)
+            .collect();
+        let moved_by = |begins: &dyn Fn(usize) -> bool| {
+            let mut moved = vec![false; model.links.len()];
+            for (idx, joint) in model.joints.iter().enumerate() {
+                moved[idx + 1] = begins(idx) || moved[joint.parent];
+            }
+            moved
+        };
+        // A link that carries an arm or the head too, such as a torso with the fingers of two arms,
+        // is not a hand.
+        let is_elsewhere =
+            |idx: &usize| self.layout.arm.contains(idx) || self.layout.head.contains(idx);
+        let is_hand = |palm: usize| {
+            let below = moved_by(&|idx| model.joints[idx].parent == palm);
+            palm > 0 && !(0..model.joints.len()).any(|idx| below[idx + 1] && is_elsewhere(&idx))
+        };
+        let hands: BTreeSet<usize> = palms
+            .iter()
+            .copied()
+            .filter(|palm| is_hand(*palm))
+            .collect();
+        let moved =
+            moved_by(&|idx| gripper.contains(idx) || hands.contains(&model.joints[idx].parent));
+        let moved = (0..model.links.len()).filter(|link| moved[*link]);
+        moved.chain(palms).collect()
+    }
+}
+
+/// A frame in a link's frame, moved and turned: the merged link, and the pose in its frame.
+pub(crate) fn frame(
+    model: &RobotModel,
+    link: &str,
+    offset_m: [f64; 3],
+    turned_rad: [f64; 3],
+) -> Result<(usize, Isometry3<f64>), RobotError> {
+    let (link, at) = model.frame(link)?;
+    Ok((link, at * moved(offset_m, turned_rad)))
+}
+
+/// The place of the profile's camera: on a link, or fixed in the world.
+pub(crate) fn camera(model: &RobotModel, profile: &RobotProfile) -> Result<Mount, RobotError> {
+    let (link, offset_m) = (&profile.camera_link, profile.camera_offset_m);
+    match frame(model, link, offset_m, profile.camera_turned_rad) {
+        Ok((link, pose)) => Ok(Mount::Link(link, pose)),
+        // A link of this name takes precedence: it is where the URDF says.
+        Err(_) if link == RobotProfile::MAP => {
+            Ok(Mount::World(moved(offset_m, profile.camera_turned_rad)))
+        }
+        Err(error) => Err(error),
+    }
+}
+
+fn moved(offset_m: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Isometry3<f64> {
+    Translation3::from(Vector3::from(offset_m))
+        * UnitQuaternion::from_euler_angles(roll, pitch, yaw)
+}
+
+/// Returns the largest force of each finger that the motors of a robot's gripper can give. Unit:
+/// newtons.
+///
+/// # Errors
+/// As [`check_robot`].
+pub fn grip_limit_n(profile: &RobotProfile) -> Result<f64, RobotError> {
+    let model = RobotModel::read(profile)?;
+    let gripper = Named::find(profile, &model)?.layout.gripper;
+    let of = |(joint, effort_per_n): (usize, f64)| model.joints[joint].effort / effort_per_n;
+    Ok(gripper.motors().map(of).fold(f64::INFINITY, f64::min))
+}
+
+/// Returns the force along the fingers of a robot's gripper, relative to that across them, with
+/// which they push a round object of this diameter out of the hand: fingers that turn are a wedge
+/// around it. Negative if they push it towards the palm. Friction with a greater coefficient holds
+/// the object. Returns `None` if they can't be closed on it. Unit: metres.
+///
+/// # Errors
+/// As [`check_robot`].
+pub fn outward_push(profile: &RobotProfile, diameter_m: f64) -> Result<Option<f64>, RobotError> {
+    let model = RobotModel::read(profile)?;
+    let named = Named::find(profile, &model)?;
+    Ok(crate::gripper::outward_push(
+        &model,
+        &named.layout.gripper,
+        named.finger_links,
+        named.grasp,
+        diameter_m,
+    ))
+}
+
+/// Returns the links of a robot whose collision shapes are between its fingers: nothing can be
+/// grasped there.
+///
+/// # Errors
+/// As [`check_robot`].
+pub fn shapes_between_fingers(profile: &RobotProfile) -> Result<Vec<String>, RobotError> {
+    let model = RobotModel::read(profile)?;
+    let named = Named::find(profile, &model)?;
+    Ok(crate::gripper::between_fingers(
+        &model,
+        named.finger_links,
+        named.grasp,
+    ))
+}
+
+/// Returns the joints of a robot's arm that can't hold its weight by their motors alone. They are
+/// simulated as balanced.
+///
+/// # Errors
+/// [`RobotError`] if the URDF can't be read.
+pub fn balanced_joints(profile: &RobotProfile) -> Result<Vec<BalancedJoint>, RobotError> {
+    RobotModel::read(profile).map(|model| model.balanced)
+}
+
+/// Returns the joints with a role whose largest effort is 0 in the URDF, and so unknown, and the
+/// effort that they are simulated with. Unit: newtons or newton metres.
+///
+/// # Errors
+/// [`RobotError`] if the URDF can't be read.
+pub fn assumed_efforts(profile: &RobotProfile) -> Result<(Vec<String>, f64), RobotError> {
+    RobotModel::read(profile).map(|model| (model.assumed, UNKNOWN_EFFORT))
+}
+
+/// As [`assumed_efforts`], for joints whose largest speed is 0. Units: rad/s for those that turn,
+/// m/s for those that slide.
+///
+/// # Errors
+/// [`RobotError`] if the URDF can't be read.
+pub fn assumed_speeds(profile: &RobotProfile) -> Result<(Vec<String>, [f64; 2]), RobotError> {
+    RobotModel::read(profile).map(|model| (model.assumed_speeds, UNKNOWN_SPEEDS))
+}
+
+/// Checks that a profile matches its URDF, without simulating.
+///
+/// # Errors
+/// [`RobotError`] for the first missing or unsupported element.
+pub fn check_robot(profile: &RobotProfile) -> Result<(), RobotError> {
+    let model = RobotModel::read(profile)?;
+    let widest_m = Named::find(profile, &model)?.layout.gripper.widest_m();
+    if profile.max_opening_m > widest_m + OPENING_SLACK_M {
+        let name = profile.urdf.name.to_string();
+        let fault = GripperFault::TooNarrow {
+            stated_m: profile.max_opening_m,
+            widest_m,
+        };
+        return Err(RobotError::Gripper { name, fault });
+    }
+    Ok(())
+}
