@@ -15,8 +15,7 @@ const LINKS: &str = "finger_links = []";
 
 /// The part of the profile: each line to fill in after a comment about its meaning.
 pub(super) fn text(hand: &UnknownHand) -> String {
-    let palm = quoted(&hand.palm);
-    let palm = palm.trim_matches('"');
+    let palm = one_line(&hand.palm);
     let mut text = format!(
         "\n# GAP: {}.\n# Fill in the two empty lists. For a suction cup, replace them by `suction_force_n`, `suction_radius_m` and \
          `grasp_link`.\n",
@@ -51,9 +50,10 @@ pub(super) fn text(hand: &UnknownHand) -> String {
          # grasp_link: a link that the fingers don't move; moved and turned by the next two lines, its frame is between the \
          fingertips,\n# with x along the fingers and y from the right to the left one. Without these lines, the place is \
          found.\n\
-         # grasp_link = \"{palm}\"\n# grasp_offset_m = {}\n# grasp_turned_rad = {}\n\
+         # grasp_link = {}\n# grasp_offset_m = {}\n# grasp_turned_rad = {}\n\
          # max_opening_m: the widest gap between the fingertips, in metres. Without this line, it is measured.\n\
          # max_opening_m = 0.08\n",
+        quoted(&palm),
         numbers(&hand.offset_m),
         numbers(&hand.turned_rad),
     );
