@@ -29,7 +29,7 @@ struct Counts {
     differ: Vec<String>,
 }
 
-/// Our own files, and one of another's robots of two models.
+/// The handed and our own files.
 #[test]
 fn files_of_every_kind_are_read_as_libsdformat_reads_them() {
     let Some(program) = foreign::sdformat() else {
