@@ -59,10 +59,8 @@ pub(crate) fn read(
             found.extend(said);
             (tree, text, BTreeMap::new(), false)
         }),
-        Some("sdf") => {
-            sdf_robot::read(source, path, lookup, found)
-                .map(|read| (read.tree, read.text, read.faults_of_visuals, false))
-        }
+        Some("sdf") => sdf_robot::read(source, path, lookup, found)
+            .map(|read| (read.tree, read.text, read.faults_of_visuals, false)),
         _ => urdf(source, found)
             .map(|read| (read.tree, source.clone(), read.faults_of_visuals, true)),
     };
