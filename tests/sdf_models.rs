@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use actcheck::base::{Files, Severity};
-use actcheck::config;
-use actcheck::data::{ModelTree, TreeGeometry, TreeJoint, TreeMotion, TreeSolid};
+use actcheck::base::{Files, Severity, Source};
+use actcheck::config::{self, Overrides};
+use actcheck::data::{ModelTree, ObjectModel, TreeGeometry, TreeJoint, TreeMotion, TreeSolid};
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use serde_json::Value;
 
@@ -29,7 +29,7 @@ struct Counts {
     differ: Vec<String>,
 }
 
-/// Our own files, and one of another's robots of two models.
+/// The handed and our own files.
 #[test]
 fn files_of_every_kind_are_read_as_libsdformat_reads_them() {
     let Some(program) = foreign::sdformat() else {
@@ -43,6 +43,21 @@ fn files_of_every_kind_are_read_as_libsdformat_reads_them() {
     assert_eq!(counts.refused, BTreeMap::new());
     assert_eq!(counts.refused_there, Vec::<String>::new());
     assert_eq!(counts.agree, files.len());
+}
+
+/// Objects, which are one body: their mass and moments, and the distances between their shapes.
+#[test]
+fn objects_are_read_as_libsdformat_reads_them() {
+    let Some(program) = foreign::sdformat() else {
+        return;
+    };
+    let folder = root().join("tests/models/sdf_objects");
+    let files = files_of(&folder);
+    assert!(files.len() >= 6, "{}", files.len());
+    assert_eq!(
+        objects_differ(program, &folder, &files),
+        Vec::<String>::new()
+    );
 }
 
 /// Files of a folder that `ACTCHECK_SDF_FOLDER` names: each `.sdf` with a robot that both read.
@@ -114,7 +129,7 @@ fn compared(program: &Path, folder: &Path, files: &[PathBuf]) -> Counts {
 /// Whether a file states its masses: libsdformat 12 computes none.
 fn is_weighed(path: &Path) -> bool {
     let text = std::fs::read_to_string(path).unwrap();
-    !text.contains("auto=\"true\"") && !text.contains("<uri>model://tool")
+    !text.contains("auto=") && !text.contains("<uri>model://tool")
 }
 
 /// The differences of a tree from libsdformat's model, in words. `weighed`: masses are compared.
@@ -178,6 +193,127 @@ fn differences(tree: &ModelTree, theirs: &Value, weighed: bool) -> Vec<String> {
     found
 }
 
+/// The differences of objects from libsdformat's models, in words.
+fn objects_differ(program: &Path, folder: &Path, files: &[PathBuf]) -> Vec<String> {
+    let output = Command::new(program)
+        .arg(folder)
+        .args(files)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    let text = format!(
+        "tests = [[\"Pick\"]]\ntest_count = 1\nmodel_dir = {:?}\n",
+        folder.display().to_string()
+    );
+    let campaign = config::load_text(Source::new("c.toml", text), folder, &Overrides::default());
+    let campaign = campaign.unwrap_or_else(|found| panic!("{found}"));
+    let mut found = Vec::new();
+    for line in stdout(&output).lines() {
+        let theirs: Value = serde_json::from_str(line).unwrap();
+        let name = Path::new(theirs["file"].as_str().unwrap())
+            .file_stem()
+            .unwrap();
+        let name = name.to_string_lossy().into_owned();
+        assert_eq!(theirs["faults"], "", "{name}");
+        let Some(model) = campaign.models.get(&name) else {
+            found.push(format!("{name} is refused"));
+            continue;
+        };
+        compare_object(&name, model, &theirs, &mut found);
+    }
+    found
+}
+
+/// Compares an object, which is moved to the ground and turned, with the links of a model that
+/// fixed joints connect.
+fn compare_object(name: &str, model: &ObjectModel, theirs: &Value, found: &mut Vec<String>) {
+    let links: Vec<&Value> = theirs["links"].as_object().unwrap().values().collect();
+    let kg = |link: &Value| link["kg"].as_f64().unwrap();
+    let com_of = |link: &Value| frame(&link["inertia"]["pose"]).translation.vector;
+    let total: f64 = links.iter().map(|link| kg(link)).sum();
+    let com = links
+        .iter()
+        .map(|link| com_of(link) * kg(link))
+        .sum::<Vector3<f64>>()
+        / total;
+    let about = |link: &Value| {
+        let arm = com_of(link) - com;
+        let turn = frame(&link["inertia"]["pose"])
+            .rotation
+            .to_rotation_matrix();
+        let apart = Matrix3::identity() * arm.norm_squared() - arm * arm.transpose();
+        turn.matrix() * moments(link) * turn.matrix().transpose() + apart * kg(link)
+    };
+    let wanted = principal(&links.iter().map(|link| about(link)).sum());
+    let Some(inertia) = &model.inertia else {
+        found.push(format!("{name} has no moments"));
+        return;
+    };
+    let own = principal(&Matrix3::from_fn(|row, column| {
+        inertia.about_com[row][column]
+    }));
+    if (model.mass_kg - total).abs() > NEAR || (own - wanted).norm() > NEAR * wanted.norm() {
+        found.push(format!(
+            "{name}: {} kg, {own} instead of {total} kg, {wanted}",
+            model.mass_kg
+        ));
+    }
+    let mut shapes = Vec::new();
+    for link in links {
+        for collision in link["collisions"].as_array().unwrap() {
+            let (at, friction) = (frame(&collision["pose"]), &collision["friction"]);
+            shapes.push(at.translation.vector);
+            if (model.friction - friction.as_f64().unwrap()).abs() > NEAR {
+                found.push(format!(
+                    "{name}: friction {} instead of {friction}",
+                    model.friction
+                ));
+            }
+        }
+    }
+    let own = model
+        .parts
+        .iter()
+        .map(|part| part.pose.to_isometry().translation.vector);
+    let own = distances(own.chain([Vector3::from(inertia.com_m)]).collect());
+    let wanted = distances(shapes.into_iter().chain([com]).collect());
+    let is_near = |(own, wanted): (&f64, &f64)| (own - wanted).abs() <= NEAR;
+    if own.len() != wanted.len() || !own.iter().zip(&wanted).all(is_near) {
+        found.push(format!(
+            "{name}: shapes {own:?} apart instead of {wanted:?}"
+        ));
+    }
+}
+
+/// The distances between all pairs of points, from the smallest to the largest.
+fn distances(points: Vec<Vector3<f64>>) -> Vec<f64> {
+    let apart = |(idx, first): (usize, &Vector3<f64>)| -> Vec<f64> {
+        points[idx + 1..]
+            .iter()
+            .map(|second| (first - second).norm())
+            .collect()
+    };
+    let mut all: Vec<f64> = points.iter().enumerate().flat_map(apart).collect();
+    all.sort_by(f64::total_cmp);
+    all
+}
+
+/// The principal moments, from the smallest to the largest.
+fn principal(inertia: &Matrix3<f64>) -> Vector3<f64> {
+    let mut moments: [f64; 3] = inertia.symmetric_eigenvalues().into();
+    moments.sort_by(f64::total_cmp);
+    Vector3::from(moments)
+}
+
+/// The moments of a link there, along the axes of its `<inertial>`.
+fn moments(link: &Value) -> Matrix3<f64> {
+    let ([xx, yy, zz], [xy, xz, yz]) = (
+        numbers::<3>(&link["inertia"]["diagonal"]),
+        numbers::<3>(&link["inertia"]["products"]),
+    );
+    Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+}
+
 /// The poses of links with all joints at 0.
 fn poses(tree: &ModelTree) -> BTreeMap<String, Isometry3<f64>> {
     let is_child = |name: &str| tree.joints.iter().any(|joint| joint.child == name);
@@ -225,11 +361,7 @@ fn compare_masses(
         &wanted["inertia"]["pose"],
         found,
     );
-    let ([xx, yy, zz], [xy, xz, yz]) = (
-        numbers::<3>(&wanted["inertia"]["diagonal"]),
-        numbers::<3>(&wanted["inertia"]["products"]),
-    );
-    let moments = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+    let moments = moments(wanted);
     if (own.about_com - moments).abs().max() > NEAR * moments.abs().max() {
         found.push(format!(
             "{name} has the moments {} instead of {moments}",

@@ -248,7 +248,7 @@ fn warn_of_pose(model: Node, reader: &mut Reader) {
     let tilt = (at.rotation * Vector3::z() - Vector3::z()).norm();
     if at.translation.z.abs() > ROUNDED || tilt > ROUNDED {
         let message = "the height and tilt of the whole robot are left out".to_owned();
-        let help = "a robot stands on the floor; a profile mounts it with `mount_height_m`";
+        let help = "the floor carries a robot; a profile mounts it with `mount_height_m`";
         reader.warning("W036", element, message, help);
     }
 }

@@ -17,7 +17,7 @@ use crate::foreign::sdf_robot_model::{Elements, End, Group, JointAt, LinkAt};
 use crate::foreign::xml::{self, Node, Reader};
 use crate::foreign::{mjcf, root_name, urdf_tree};
 use actcheck_base::{Diagnostics, Source};
-use actcheck_data::{ModelTree, TreeGeometry};
+use actcheck_data::{ModelTree, TreeGeometry, TreeJoint};
 
 /// Most files that a robot may consist of.
 const MOST_FILES: usize = 200;
@@ -246,17 +246,17 @@ fn of_tree(tree: ModelTree, file: &File) -> Option<Submodel> {
         },
     );
     let position = |name: &str| tree.links.iter().position(|link| link.name == name);
-    let joints = tree.joints.iter().filter_map(|joint| {
+    let end = |name: &str| position(name).map_or(End::World, End::Link);
+    let joints = tree.joints.iter().map(|joint| {
         let frame = at(&joint.child);
-        let mut moved = joint.clone();
-        moved.axis = frame.rotation * joint.axis;
-        Some(JointAt {
-            ends: [&joint.parent, &joint.child]
-                .map(|end| position(end).map(End::Link))
-                .map(|end| end.unwrap_or(End::World)),
-            joint: moved,
+        JointAt {
+            ends: [end(&joint.parent), end(&joint.child)],
+            joint: TreeJoint {
+                axis: frame.rotation * joint.axis,
+                ..joint.clone()
+            },
             frame,
-        })
+        }
     });
     let mut group = Group {
         joints: joints.collect(),

@@ -67,7 +67,11 @@ pub(crate) fn assemble(name: String, mut group: Group, reader: &mut Reader) -> A
         if let Some(faults) = link.faults_of_visuals {
             faults_of_visuals.insert(link.link.name.clone(), faults);
         }
-        links.push(moved(link.link, &(frame.inverse() * link.at)));
+        // Most frames are those of their links: no digit changes then.
+        links.push(match *frame == link.at {
+            true => link.link,
+            false => moved(link.link, &(frame.inverse() * link.at)),
+        });
     }
     Assembled {
         tree: ModelTree {
