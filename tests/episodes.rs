@@ -324,6 +324,19 @@ fn faults_are_reported_and_store_nothing() {
     written("flipped.mcap", &flipped);
     written("empty.mcap", b"");
     written("text.mcap", b"not an episode");
+    written("two.mcap", &[&good[..], &good].concat());
+    let large = |name: &str, text: &[u8]| {
+        written(name, text);
+        let file = fs::File::options()
+            .write(true)
+            .open(folder.path().join(name));
+        file.unwrap().set_len(2 << 30).unwrap();
+    };
+    large("large.mcap", &good);
+    let begin = b"\x89MCAP0\r\n\x01\x14\0\0\0\0\0\0\0\x08\0\0\0actcheck";
+    large("zeros.mcap", begin);
+    let long = b"\x89MCAP0\r\n\x01\0\0\0\x40\0\0\0\0\x08\0\0\0actcheck";
+    large("record.mcap", long);
     let mapping = fs::read_to_string(data("made.toml")).unwrap();
     written(
         "misspelt.toml",
@@ -357,6 +370,14 @@ fn faults_are_reported_and_store_nothing() {
         ("flipped.mcap", &mapping, vec!["E002"]),
         ("empty.mcap", &mapping, vec!["E0"]),
         ("text.mcap", &mapping, vec!["E0"]),
+        ("two.mcap", &mapping, vec!["E002", "goes on after its end"]),
+        (
+            "large.mcap",
+            &mapping,
+            vec!["E002", "goes on after its end"],
+        ),
+        ("zeros.mcap", &mapping, vec!["E002", "has no kind"]),
+        ("record.mcap", &mapping, vec!["E002", "exceeds limit"]),
         ("missing.mcap", &mapping, vec!["E001"]),
         (&good, "missing.toml", vec!["E005"]),
         (&good, "misspelt.toml", vec!["E010", "did you mean `cube`?"]),
@@ -386,9 +407,7 @@ fn faults_are_reported_and_store_nothing() {
                 "{episode} {mapping}: no `{code}` in {text}"
             );
         }
-        let campaigns = folder.path().join("h/campaigns");
-        let stored = fs::read_dir(campaigns).map_or(0, Iterator::count);
-        assert_eq!(stored, 0, "{episode} {mapping}");
+        assert!(!folder.path().join("h").exists(), "{episode} {mapping}");
     }
 }
 
@@ -437,6 +456,77 @@ fn each_engine_has_its_own_campaign() {
     );
     let rows: Vec<String> = stdout(&output).lines().map(str::to_owned).collect();
     assert_eq!(rows[1..], ["Ours,1", "an unknown engine,2"]);
+}
+
+/// Imports by one mapping have the same configuration and seed. Those of the same episodes are one
+/// campaign, and those of others are not.
+#[test]
+fn imports_are_merged_by_their_episodes() {
+    let folder = tempfile::tempdir().unwrap();
+    let mapping = file("made.toml");
+    let import = |episode: &str, history: &str| {
+        let episode = file(episode);
+        let arguments = [
+            "import",
+            &episode,
+            "--mapping",
+            &mapping,
+            "--history",
+            history,
+        ];
+        let output = actcheck(folder.path(), &arguments);
+        assert!(
+            output.status.code().is_some_and(|code| code < 2),
+            "{}",
+            stderr(&output)
+        );
+    };
+    import("good-000001.mcap", "good");
+    import("good-000001.mcap", "again");
+    import("drop-000002.mcap", "drop");
+    let merge = |arguments: &[&str]| {
+        let arguments: Vec<&str> = [&["merge"], arguments].concat();
+        let output = actcheck(folder.path(), &arguments);
+        (output.status.code(), stderr(&output))
+    };
+    assert_eq!(merge(&["good", "again", "--into", "same"]).0, Some(0));
+    let (code, text) = merge(&["good", "drop", "--into", "both"]);
+    assert_eq!(code, Some(2), "{text}");
+    assert!(text.contains("H022") && text.contains("--rename"), "{text}");
+    assert!(!folder.path().join("both").exists());
+    let all = ["drop", "again", "good", "--into", "both", "--rename"];
+    let (code, text) = merge(&all);
+    assert_eq!(code, Some(0), "{text}");
+    let listed = |history: &str| -> Vec<(String, bool)> {
+        let output = actcheck(
+            folder.path(),
+            &["list", "--history", history, "--format", "json"],
+        );
+        let runs: Value = serde_json::from_str(&stdout(&output)).unwrap();
+        let run = |run: &Value| {
+            let is_dropped = run["score"].as_f64().unwrap() < 1.0;
+            (run["run"].as_str().unwrap().to_owned(), is_dropped)
+        };
+        runs.as_array().unwrap().iter().map(run).collect()
+    };
+    assert_eq!(listed("same").len(), 1);
+    let both = listed("both");
+    assert_eq!(both.len(), 2, "{both:?}");
+    assert_ne!(both[0].0, both[1].0);
+    assert_eq!(
+        both.iter().filter(|(_, is_dropped)| *is_dropped).count(),
+        1,
+        "{both:?}"
+    );
+    let checked = actcheck(
+        folder.path(),
+        &["health", "--integrity", "--history", "both"],
+    );
+    assert_eq!(checked.status.code(), Some(0), "{}", stderr(&checked));
+    // A merge into one of them adds the other.
+    let (code, text) = merge(&["drop", "--into", "good", "--rename"]);
+    assert_eq!(code, Some(0), "{text}");
+    assert_eq!(listed("good").len(), 2);
 }
 
 /// Every cut and many flips of a file are refused or read, and never a panic.

@@ -14,10 +14,22 @@ use serde_json::{Value, json};
 
 use crate::support::{actcheck, foreign, judge_values, project, root, stderr, stdout};
 
-/// Number of outcomes to compare. Without it, a small campaign is compared.
+/// Number of outcomes to compare. Without it, small campaigns are compared.
 const OUTCOMES: &str = "ACTCHECK_JUDGE_OUTCOMES";
 /// Ontologies whose rules are compared: with those about time and about the robot itself.
 const ONTOLOGIES: [&str; 3] = ["actions.ttl", "time.ttl", "extra.ttl"];
+
+/// Shipped configurations, each with a number of outcomes that every run has at least on average.
+const CONFIGS: [(&str, usize); 8] = [
+    ("pick_and_place", 30),
+    ("pick", 10),
+    ("clutter", 10),
+    ("perceive", 10),
+    ("move_to", 10),
+    ("fixed_arm", 10),
+    ("suction_arm", 10),
+    ("lone_glass", 10),
+];
 
 /// One performed action with the outcomes that `recheck` gives it.
 struct Judged {
@@ -26,39 +38,51 @@ struct Judged {
     outcomes: Vec<Judgement>,
 }
 
-/// The actions of a campaign, judged by `recheck`.
+/// The actions of several campaigns, judged by `recheck`.
 fn judged() -> &'static [Judged] {
     static JUDGED: OnceLock<Vec<Judged>> = OnceLock::new();
     JUDGED.get_or_init(|| {
         let wanted = std::env::var(OUTCOMES).ok();
-        let wanted: usize = wanted.map_or(200, |wanted| wanted.parse().unwrap());
-        // A run has some fifty outcomes.
-        let runs = (wanted / 60 + 2).to_string();
-        let folder = project();
-        let config = "configs/pick_and_place.toml";
-        let ran = actcheck(
-            folder.path(),
-            &["run", config, "--runs", &runs, "--history", "h"],
-        );
-        assert!(
-            ran.status.code().is_some_and(|code| code < 2),
-            "{}",
-            stderr(&ran)
-        );
-        let history = History::open_existing(&folder.path().join("h")).unwrap();
-        let rows = history.runs(&RunFilter::default()).unwrap();
-        let traces: Vec<Trace> = rows
+        let wanted: usize = wanted.map_or(400, |wanted| wanted.parse().unwrap());
+        let share = wanted.div_ceil(CONFIGS.len());
+        let judged: Vec<Judged> = CONFIGS
             .iter()
-            .map(|row| history.traces().of(row, true).unwrap())
-            .collect();
-        let judged: Vec<Judged> = ONTOLOGIES
-            .iter()
-            .flat_map(|ontology| of_ontology(&history, &rows, &traces, ontology))
+            .flat_map(|(config, of_run)| of_campaign(config, share / of_run + 1, share))
             .collect();
         let outcomes: usize = judged.iter().map(|action| action.outcomes.len()).sum();
         assert!(outcomes >= wanted, "{outcomes}");
         judged
     })
+}
+
+/// The actions of one campaign, which must have a number of outcomes.
+fn of_campaign(config: &str, runs: usize, wanted: usize) -> Vec<Judged> {
+    let folder = project();
+    let path = format!("configs/{config}.toml");
+    let runs = runs.to_string();
+    let ran = actcheck(
+        folder.path(),
+        &["run", &path, "--runs", &runs, "--history", "h"],
+    );
+    assert!(
+        ran.status.code().is_some_and(|code| code < 2),
+        "{config}: {}",
+        stderr(&ran)
+    );
+    let history = History::open_existing(&folder.path().join("h")).unwrap();
+    let rows = history.runs(&RunFilter::default()).unwrap();
+    let traces: Vec<Trace> = rows
+        .iter()
+        .map(|row| history.traces().of(row, true).unwrap())
+        .collect();
+    let judged: Vec<Judged> = ONTOLOGIES
+        .iter()
+        .flat_map(|ontology| of_ontology(&history, &rows, &traces, ontology))
+        .collect();
+    let outcomes: usize = judged.iter().map(|action| action.outcomes.len()).sum();
+    eprintln!("{config}: {runs} runs, {outcomes} outcomes");
+    assert!(outcomes >= wanted, "{config}: {outcomes}");
+    judged
 }
 
 fn of_ontology(
@@ -126,7 +150,7 @@ fn the_judge_gives_every_outcome_that_recheck_gives() {
 
 /// A copy of the package with the compiled rules of `make judge`. Returns `None` without them: they
 /// take as long to compile as the program.
-fn package() -> Option<&'static Path> {
+pub fn package() -> Option<&'static Path> {
     static PACKAGE: OnceLock<Result<PathBuf, String>> = OnceLock::new();
     let package = PACKAGE.get_or_init(|| {
         let sources = root().join("clients/python/src/actcheck");

@@ -1,11 +1,13 @@
 //! The notebooks run from top to bottom on fresh campaigns, and the committed output is that of
 //! such a run.
 
+use std::path::Path;
 use std::process::Command;
 
 use regex::Regex;
 use serde_json::Value;
 
+use crate::judge_in_python;
 use crate::support::{foreign, root, stderr};
 
 fn notebooks() -> Vec<(String, Value)> {
@@ -42,6 +44,7 @@ fn committed_notebooks_were_run_in_order() {
         "comparing",
         "failure_patterns",
         "first_look",
+        "judge_robosuite",
         "second_judgement",
         "sparql",
     ];
@@ -140,8 +143,50 @@ fn notebooks_run_on_fresh_campaigns() {
         .output()
         .unwrap();
     assert!(output.status.success(), "{}", stderr(&output));
+    compare(folder.path(), |name| name != ROBOSUITE);
+}
+
+/// The notebook in which the rules decide about success in an environment of others.
+#[test]
+fn the_notebook_of_judge_runs_in_robosuite() {
+    let Some(package) = judge_in_python::package() else {
+        return;
+    };
+    let Some(python) = foreign::robosuite() else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let output = Command::new(python)
+        .arg(root().join("notebooks/regenerate.py"))
+        .args(["--only", "judge_robosuite", "--into"])
+        .arg(folder.path())
+        .env("HOME", folder.path())
+        .env("PYTHONPATH", package)
+        .env("PYTHONDONTWRITEBYTECODE", "1")
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+    compare(folder.path(), |name| name == ROBOSUITE);
+    let text = std::fs::read_to_string(folder.path().join(ROBOSUITE)).unwrap();
+    for (episode, is_success) in [
+        ("grasped", "True"),
+        ("teleported", "False"),
+        ("balanced", "False"),
+    ] {
+        let line = format!("{episode}: robosuite's own check True, the rules {is_success}");
+        assert!(text.contains(&line), "{line}");
+    }
+}
+
+const ROBOSUITE: &str = "judge_robosuite.ipynb";
+
+/// Notebooks in a folder ran to their ends, and have the cells of the committed ones.
+fn compare(folder: &Path, is_wanted: impl Fn(&str) -> bool) {
     for (name, committed) in notebooks() {
-        let text = std::fs::read_to_string(folder.path().join(&name)).unwrap();
+        if !is_wanted(&name) {
+            continue;
+        }
+        let text = std::fs::read_to_string(folder.join(&name)).unwrap();
         let run: Value = serde_json::from_str(&text).unwrap();
         assert!(
             code(&run)

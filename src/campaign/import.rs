@@ -60,11 +60,11 @@ pub struct ImportedCampaign {
 /// Imports episodes into a history as runs: one campaign for each mapping and physics engine, so that
 /// no rate mixes engines.
 ///
-/// An episode with a fault is left out and does not stop the others; if all have faults, the history
-/// is left unchanged. `now` returns the present time as RFC 3339, and `on_run` is called for each
-/// stored run.
+/// An episode with a fault is left out and does not stop the others. `open` opens the history, or
+/// creates it, for the first episode without a fault: if all have faults, nothing is created or
+/// changed. `now` returns the present time as RFC 3339, and `on_run` is called for each stored run.
 pub fn import(
-    history: &History,
+    open: impl Fn() -> Result<History, Diagnostics>,
     files: &[EpisodeFile<'_>],
     options: &ImportOptions,
     (now, stop): (fn() -> String, &AtomicBool),
@@ -75,17 +75,40 @@ pub fn import(
         campaigns: Vec::new(),
         faults: Diagnostics::new(),
     };
-    let stopped = imported(history, files, options, (now, stop), &mut on_run, &mut end)
-        .and_then(|()| finish(history, &end, now));
+    let mut history = Target { open, opened: None };
+    let stopped = imported(
+        &mut history,
+        files,
+        options,
+        (now, stop),
+        &mut on_run,
+        &mut end,
+    )
+    .and_then(|()| finish(&history, &end, now));
     if let Err(faults) = stopped {
         end.ending = Ending::Stopped(faults);
     }
     end
 }
 
+/// A history that is opened when it is needed.
+struct Target<F> {
+    open: F,
+    opened: Option<History>,
+}
+
+impl<F: Fn() -> Result<History, Diagnostics>> Target<F> {
+    fn history(&mut self) -> Result<&History, Diagnostics> {
+        match &mut self.opened {
+            Some(history) => Ok(history),
+            none => Ok(none.insert((self.open)()?)),
+        }
+    }
+}
+
 /// Imports episodes, batch by batch.
 fn imported(
-    history: &History,
+    history: &mut Target<impl Fn() -> Result<History, Diagnostics>>,
     files: &[EpisodeFile<'_>],
     options: &ImportOptions,
     (now, stop): (fn() -> String, &AtomicBool),
@@ -126,7 +149,7 @@ fn imported(
                         .iter()
                         .filter(|other| other.mapping.source.text == file.mapping.source.text)
                         .count();
-                    let begun = begin(history, file, planned, engine, options, now)?;
+                    let begun = begin(history.history()?, file, planned, engine, options, now)?;
                     end.campaigns.push(begun);
                     end.campaigns.len() - 1
                 }
@@ -135,7 +158,7 @@ fn imported(
             record.index = campaign.runs;
             record.id = format!("{}-{}", campaign.id, campaign.runs + 1);
             record.campaign.clone_from(&campaign.id);
-            history.write(&Entry::whole(&record)?)?;
+            history.history()?.write(&Entry::whole(&record)?)?;
             campaign.add(&record);
             on_run();
         }
@@ -207,7 +230,10 @@ fn begin(
 }
 
 /// Stores the ends of all campaigns.
-fn finish(history: &History, end: &ImportEnd, now: fn() -> String) -> Result<(), Diagnostics> {
+fn finish<F>(history: &Target<F>, end: &ImportEnd, now: fn() -> String) -> Result<(), Diagnostics> {
+    let Some(history) = &history.opened else {
+        return Ok(());
+    };
     for campaign in &end.campaigns {
         let score = mean(campaign.scores.iter().copied());
         let mut outcomes: BTreeMap<Outcome, u64> = BTreeMap::new();

@@ -80,7 +80,6 @@ pub fn import(args: &ImportArgs) -> Result<u8, Diagnostics> {
     if files.is_empty() {
         return Err(first_of_episodes(faults));
     }
-    let history = History::open(&args.history)?;
     let progress = Progress::new(files.len() as u64, None);
     let bar = progress.bar();
     let stop = stop::on_interrupt(move || {
@@ -96,7 +95,7 @@ pub fn import(args: &ImportArgs) -> Result<u8, Diagnostics> {
             .unwrap_or_default(),
     };
     let end = import_all(
-        &history,
+        || History::open(&args.history),
         &files,
         &options,
         (clock::system().now, &stop),

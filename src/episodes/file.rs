@@ -23,6 +23,8 @@ use crate::{
 const LARGEST_RECORD: usize = 64 << 20;
 /// Most states of an episode.
 const MOST_STATES: usize = 1_000_000;
+/// Most records of a file: the channels and quantities of [`MOST_STATES`], with room to spare.
+const MOST_RECORDS: usize = 16 * MOST_STATES;
 /// Longest episode. Unit: seconds.
 const LONGEST_SECS: f64 = 4.0 * 3600.0;
 /// Largest absolute value of positions, velocities and forces. Larger ones come from a simulation
@@ -100,6 +102,7 @@ impl Records {
             .with_validate_summary_section_crc(true)
             .with_record_length_limit(LARGEST_RECORD);
         let mut reader = LinearReader::new_with_options(options);
+        let mut count = 0;
         while let Some(event) = reader.next_event() {
             match event? {
                 LinearReadEvent::ReadRequest(size) => {
@@ -108,8 +111,20 @@ impl Records {
                     self.digest.update(&buffer[..count]);
                     reader.notify_read(count);
                 }
-                LinearReadEvent::Record { data, opcode } => see(parse_record(opcode, data)?)?,
+                LinearReadEvent::Record { opcode: 0, .. } => {
+                    return Err(FileFault::Damaged("a record has no kind"));
+                }
+                LinearReadEvent::Record { data, opcode } => {
+                    count += 1;
+                    if count > MOST_RECORDS {
+                        return Err(FileFault::TooMany);
+                    }
+                    see(parse_record(opcode, data)?)?;
+                }
             }
+        }
+        if self.file.read(&mut [0])? > 0 {
+            return Err(FileFault::Damaged("the file goes on after its end"));
         }
         Ok(())
     }
@@ -120,6 +135,8 @@ impl Records {
 enum FileFault {
     #[error("not an MCAP file, or damaged: {0}")]
     Mcap(#[from] mcap::McapError),
+    #[error("not an MCAP file, or damaged: {0}")]
+    Damaged(&'static str),
     #[error("can't be read: {0}")]
     Unreadable(#[from] std::io::Error),
     #[error("a message on `{topic}` can't be read: {reason}")]
@@ -132,6 +149,8 @@ enum FileFault {
     Value(String),
     #[error("it has more than {MOST_STATES} states")]
     TooLong,
+    #[error("it has more than {MOST_RECORDS} records")]
+    TooMany,
     #[error("it lasts {0} s, longer than {LONGEST_SECS} s")]
     TooLate(f64),
 }
@@ -147,7 +166,7 @@ impl FileFault {
     fn words(&self) -> (&'static str, String, &'static str) {
         let (code, help) = match self {
             Self::Unreadable(_) => ("E001", "copy the file again from its source"),
-            Self::Mcap(_) | Self::Message { .. } => {
+            Self::Mcap(_) | Self::Damaged(_) | Self::Message { .. } => {
                 ("E002", "record it again, or copy it again from its source")
             }
             Self::Missing(_) => (
@@ -162,7 +181,7 @@ impl FileFault {
                 "E003",
                 "the simulation diverged, or the file was edited: leave this episode out",
             ),
-            Self::TooLong | Self::TooLate(_) => ("E004", "record shorter episodes"),
+            Self::TooLong | Self::TooMany | Self::TooLate(_) => ("E004", "record shorter episodes"),
         };
         (code, self.to_string(), help)
     }

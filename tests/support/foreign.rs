@@ -160,6 +160,14 @@ fn flags_of_sdformat() -> Result<String, String> {
     flags.ok_or_else(|| "pkg-config finds no sdformat12 to sdformat16".to_owned())
 }
 
+/// Python with robosuite and the tools that execute a notebook, cached beside the build output.
+/// Returns `None` if it can't be created.
+pub fn robosuite() -> Option<&'static Path> {
+    static PYTHON: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    let python = PYTHON.get_or_init(|| environment("robosuite", "robosuite.txt"));
+    made(python, "robosuite from PyPI").map(PathBuf::as_path)
+}
+
 /// Allure's own generator from npm, as `tests/foreign/package.json` pins it, cached beside the
 /// build output. Returns `None` if it can't be installed.
 pub fn allure() -> Option<&'static Path> {

@@ -144,6 +144,16 @@ class Robosuite(Converting):
             file["data/demo_1/states"] = h5py.SoftLink("/data/elsewhere")
         self.assertEqual(self.fault(path), "unsafe-link")
 
+    def test_a_small_file_that_claims_a_billion_states(self) -> None:
+        import h5py
+
+        path = self.written()
+        for shape, chunks in (((1_000_000_000, 16), (1024, 16)), ((4, 1_000_000), (1, 1024)), ((1_000_000, 2048), (1_000_000, 64))):
+            with h5py.File(path, "r+") as file:
+                del file["data/demo_1/states"]
+                file["data/demo_1"].create_dataset("states", shape, "f8", chunks=chunks, compression="gzip")
+            self.assertEqual(self.fault(path), "too-large")
+
     def with_mesh(self, file: str | Path, attributes: str = "") -> Path:
         """A file whose cube has a mesh besides its box."""
         mass = '<inertial pos="0 0 0" mass="1" diaginertia=".01 .01 .01"/>'

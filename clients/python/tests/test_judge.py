@@ -141,7 +141,7 @@ class Judging(unittest.TestCase):
         self.assertEqual(again.faults, caught.exception.faults)
         with self.assertRaisesRegex(actcheck.JudgeError, "did you mean `Pick`"):
             self.judge("Pik", state(), state())
-        with self.assertRaisesRegex(TypeError, "no plain value"):
+        with self.assertRaisesRegex(TypeError, "is not a plain value"):
             self.judge("Pick", state(), {"bodies": object()}, parameters=PICK)
         looped: list[Any] = []
         looped.append(looped)

@@ -177,33 +177,56 @@ enum Identity {
     Whole {
         first_id: String,
         whole: String,
+        /// The contents of its runs, if nothing else tells it apart.
         content: Option<String>,
     },
 }
 
-fn identity(found: &Found) -> Identity {
+fn identity(found: &Found, all: &[Found]) -> Identity {
     if !found.record.shards.is_empty() {
         return Identity::Parts(found.inputs_digest());
     }
     Identity::Whole {
         first_id: found.first_id.clone(),
         whole: found.inputs_digest(),
-        // Shrunk runs of several parts can have the same id.
-        content: found.shrunk.then(|| {
-            found
-                .runs
-                .values()
-                .map(|run| run.content.as_str())
-                .collect()
-        }),
+        content: if found.shrunk {
+            // Shrunk runs of several parts can have the same id.
+            Some(content(found))
+        } else if found.record.imported_from.is_some() {
+            // So can imports of different episodes by one mapping.
+            Some(content(complete_copy(found, all)))
+        } else {
+            None
+        },
     }
+}
+
+/// The contents of all its runs.
+fn content(found: &Found) -> String {
+    let runs = found.runs.values();
+    runs.map(|run| run.content.as_str()).collect()
+}
+
+/// The campaign with the most runs, of those that have all runs of an imported one.
+fn complete_copy<'a>(found: &'a Found, all: &'a [Found]) -> &'a Found {
+    let has_all = |other: &&Found| {
+        let has = |(index, run): (&u64, &FoundRun)| {
+            let other = other.runs.get(index);
+            other.is_some_and(|other| other.content == run.content)
+        };
+        found.inputs_digest() == other.inputs_digest() && found.runs.iter().all(has)
+    };
+    all.iter()
+        .filter(has_all)
+        .max_by_key(|other| (other.runs.len(), content(other)))
+        .unwrap_or(found)
 }
 
 /// Groups campaigns by identity; those of the destination first, then by start, id and folder.
 fn groups(all: &[Found]) -> Vec<Vec<&Found>> {
     let mut groups: BTreeMap<Identity, Vec<&Found>> = BTreeMap::new();
     for found in all {
-        groups.entry(identity(found)).or_default().push(found);
+        groups.entry(identity(found, all)).or_default().push(found);
     }
     let mut groups: Vec<Vec<&Found>> = groups.into_values().collect();
     for group in &mut groups {

@@ -59,6 +59,7 @@ impl Found {
             &record.config_digest,
             &record.ontology_digest,
             &record.strategy,
+            record.imported_from.as_ref().unwrap_or(&String::new()),
         ]
         .into_iter()
         .chain(program)

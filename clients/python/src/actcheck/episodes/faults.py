@@ -9,6 +9,7 @@ Code = Literal[
     "unknown-format",
     "damaged",
     "missing-package",
+    "too-large",
     "unsafe-link",
     "unsafe-model",
     "model-missing",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,6 +17,8 @@ from actcheck.recording.states import Array
 
 #: Filters that are built into HDF5 and h5py: deflate, shuffle, checksum, szip, n-bit, scale-offset, LZF. Others are plugins.
 _FILTERS = {1, 2, 3, 4, 5, 6, 32000}
+#: Most states of an episode, most numbers in one, and largest part that HDF5 reads at once: a small file can say that it has billions.
+_MOST_STATES, _MOST_NUMBERS, _LARGEST_CHUNK = 1_000_000, 10_000, 256 << 20
 _MAGIC = b"\x89HDF\r\n\x1a\n"
 
 
@@ -43,7 +46,7 @@ def opened(path: Path) -> Iterator[Any]:
 def child(group: Any, name: str) -> Any:
     """A member of a group, by a path without links; `None` if it is absent.
 
-    Raises `EpisodeFault` for an external or soft link, a dataset that is stored in other files, or one that needs a plugin.
+    Raises `EpisodeFault` for an external or soft link, a dataset that is stored in other files, one that needs a plugin, or one that is too large.
     """
     import h5py
 
@@ -63,6 +66,7 @@ def child(group: Any, name: str) -> Any:
             raise EpisodeFault("damaged", f"{group.name}/{part} can't be read: {fault}") from fault
     if isinstance(group, h5py.Dataset):
         _self_contained(group)
+        _small_enough(group)
     return group
 
 
@@ -78,6 +82,18 @@ def _self_contained(dataset: Any) -> None:
     used = {properties.get_filter(at)[0] for at in range(properties.get_nfilters())}
     if not used <= _FILTERS:
         raise EpisodeFault("unsafe-link", f"{dataset.name} needs an HDF5 plugin; store it with gzip or uncompressed")
+
+
+def _small_enough(dataset: Any) -> None:
+    rows, *inner = dataset.shape or (1,)
+    if rows > _MOST_STATES:
+        raise EpisodeFault("too-large", f"{dataset.name} has {rows} rows; at most {_MOST_STATES} are read: divide the episode")
+    row = math.prod(inner)
+    if row > _MOST_NUMBERS:
+        raise EpisodeFault("too-large", f"{dataset.name} has {row} numbers in a row; at most {_MOST_NUMBERS} are read")
+    chunk = math.prod(dataset.chunks or (0,)) * dataset.dtype.itemsize
+    if chunk > _LARGEST_CHUNK:
+        raise EpisodeFault("too-large", f"{dataset.name} has chunks of {chunk} bytes; store it with chunks of at most {_LARGEST_CHUNK}")
 
 
 def numbers(dataset: Any, begin: int, end: int) -> Array:
