@@ -58,7 +58,7 @@ mod tests {
 
     /// The shipped robot with a forearm of many pieces.
     fn with_pieces() -> World {
-        let mut profile = lonely().robot.profile.as_ref().clone();
+        let profile = lonely().robot.profile.as_ref().clone();
         let link = "<link name=\"wrist_flex_link\">";
         assert!(profile.urdf.text.contains(link));
         let piece =
