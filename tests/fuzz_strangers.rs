@@ -361,7 +361,9 @@ fn robots() {
         );
         match read {
             Ok(campaign) => {
-                if let Err(error) = world::check_robot(&campaign.robot) {
+                if let Err(error) =
+                    world::Robot::compile(&campaign.robot).and_then(|robot| robot.check())
+                {
                     show(&error.diagnostic().into());
                 }
             }

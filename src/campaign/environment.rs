@@ -20,7 +20,7 @@ use actcheck_protocol::Programs;
 use actcheck_rules::{Budget, RuleBook};
 use actcheck_scenario::Space;
 use actcheck_search::Strategy;
-use actcheck_world as world;
+use actcheck_world::{self as world, Robot};
 
 /// A configuration with its ontology, scene space and rules, prepared once and shared by all
 /// workers.
@@ -29,6 +29,8 @@ pub struct Env {
     pub campaign: Campaign,
     /// Its ontology.
     pub ontology: Ontology,
+    /// Its robot, compiled for all simulations.
+    pub robot: Robot,
     /// The space of scenes that it describes.
     pub space: Space,
     /// The rules of all properties, ready to judge.
@@ -181,12 +183,13 @@ impl Env {
         solids::decompose_meshes(&mut campaign, &mut faults);
         check_search(&campaign, &mut faults);
         check_skills(&campaign, &ontology, &mut faults);
-        if let Err(error) =
-            solids::complete_robot(&mut campaign).and_then(|()| world::check_robot(&campaign.robot))
-        {
+        let robot = solids::complete_robot(&mut campaign)
+            .map_err(|error| faults.push(error.diagnostic()))
+            .ok();
+        if let Some(Err(error)) = robot.as_ref().map(Robot::check) {
             faults.push(error.diagnostic());
         }
-        let implausible = plausible::implausible(&campaign);
+        let implausible = plausible::implausible(&campaign, robot.as_ref());
         campaign.warnings.extend(implausible.clone());
         let space = Space::new(&campaign, &ontology)
             .map_err(|found| faults.extend(found))
@@ -199,8 +202,8 @@ impl Env {
             .map_err(|found| faults.extend(found))
             .ok()
             .flatten();
-        match (space, rules) {
-            (Some(space), Some(rules)) if !faults.has_errors() => {
+        match (robot, space, rules) {
+            (Some(robot), Some(space), Some(rules)) if !faults.has_errors() => {
                 let of_case = check_case(&campaign, &space);
                 if of_case.has_errors() {
                     faults.extend(of_case);
@@ -212,6 +215,7 @@ impl Env {
                 faults.or(Self {
                     campaign,
                     ontology,
+                    robot,
                     space,
                     rules,
                     rule_budget,
@@ -243,9 +247,9 @@ impl Env {
         findings
     }
 
-    /// The robot in its postures, for a picture. Empty if its model can't be read.
+    /// The robot in its postures, for a picture.
     pub fn robot_views(&self) -> Vec<RobotView> {
-        world::robot_views(&self.campaign.robot).unwrap_or_default()
+        self.robot.views()
     }
 
     /// The campaign's record for the history.

@@ -138,9 +138,10 @@ impl Env {
         if robot.suction.is_some() {
             return None;
         }
-        let links = world::shapes_between_fingers(robot)
-            .ok()
-            .filter(|links| !links.is_empty())?;
+        let links = self.robot.shapes_between_fingers();
+        if links.is_empty() {
+            return None;
+        }
         let names = links.join("`, `");
         let message = format!(
             "the shape of `{names}` is between the fingers of {}: it keeps every object out of the hand",
@@ -164,9 +165,10 @@ impl Env {
     /// S075 if joints with a role have no known effort.
     fn unknown_efforts(&self) -> Option<Diagnostic> {
         let robot = &self.campaign.robot;
-        let (joints, effort) = world::assumed_efforts(robot)
-            .ok()
-            .filter(|(joints, _)| !joints.is_empty())?;
+        let (joints, effort) = (self.robot.assumed_efforts(), world::UNKNOWN_EFFORT);
+        if joints.is_empty() {
+            return None;
+        }
         let message = format!(
             "the `effort` of `{}` of {} is 0 or -1, and so unknown: {effort} N or N·m is used",
             joints.join("`, `"),
@@ -183,9 +185,10 @@ impl Env {
     /// S075 if joints with a role have no known speed.
     fn unknown_speeds(&self) -> Option<Diagnostic> {
         let robot = &self.campaign.robot;
-        let (joints, [turning, sliding]) = world::assumed_speeds(robot)
-            .ok()
-            .filter(|(joints, _)| !joints.is_empty())?;
+        let (joints, [turning, sliding]) = (self.robot.assumed_speeds(), world::UNKNOWN_SPEEDS);
+        if joints.is_empty() {
+            return None;
+        }
         let message = format!(
             "the largest `velocity` of `{}` of {} is 0 or -1, and so unknown: {turning} rad/s or {sliding} m/s is used",
             joints.join("`, `"),
@@ -203,7 +206,7 @@ impl Env {
     /// S074 for each joint of the arm that can't hold the arm by its motor alone.
     fn too_weak(&self) -> Vec<Diagnostic> {
         let robot = &self.campaign.robot;
-        let warning = |joint: world::BalancedJoint| {
+        let warning = |joint: &world::BalancedJoint| {
             let message = format!(
                 "the joint `{}` of {} can't hold the arm: its `effort` is {:.1}, and the weight of the links beyond it \
                  needs up to {:.1}; it is simulated as balanced by a spring",
@@ -215,11 +218,7 @@ impl Env {
                 .warning("S074", "robot.profile", message)
                 .help(help)
         };
-        world::balanced_joints(robot)
-            .unwrap_or_default()
-            .into_iter()
-            .map(warning)
-            .collect()
+        self.robot.balanced_joints().iter().map(warning).collect()
     }
 
     /// S070 if the gripper opens too little for the narrower side.
@@ -270,7 +269,7 @@ impl Env {
     fn squeezed_out(&self, key: &str, model: &ObjectModel) -> Option<Diagnostic> {
         let (robot, [width, depth, _]) = (&self.campaign.robot, model.size_m);
         let width_m = width.min(depth);
-        let steepness = world::outward_push(robot, width_m).ok()??;
+        let steepness = self.robot.outward_push(width_m)?;
         let friction = (robot.finger_friction * model.friction).sqrt();
         if steepness < friction {
             return None;
@@ -314,9 +313,10 @@ impl Env {
             let Some(scene) = self.draw(&values, test) else {
                 continue;
             };
-            let (Some(target), Ok(mut world)) =
-                (designated(&scene, "pickObject"), world::build(&scene))
-            else {
+            let (Some(target), Ok(mut world)) = (
+                designated(&scene, "pickObject"),
+                world::build_with(&scene, &self.robot),
+            ) else {
                 continue;
             };
             n_places += 1;
@@ -380,7 +380,8 @@ impl Env {
             let Some(scene) = self.draw(values, test) else {
                 continue;
             };
-            let (Some(top_m), Ok(world)) = (top_of(&scene), world::build(&scene)) else {
+            let (Some(top_m), Ok(world)) = (top_of(&scene), world::build_with(&scene, &self.robot))
+            else {
                 continue;
             };
             let Some(why) = self.unseen(&world, top_m, is_in_front) else {

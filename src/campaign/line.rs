@@ -300,7 +300,7 @@ fn perform(
     disturb: impl FnOnce(&mut World),
     interference: Interference<'_>,
 ) -> Result<(Trace, Option<Quality>), Failure> {
-    let mut world = match world::build(scene) {
+    let mut world = match world::build_with(scene, &env.robot) {
         Ok(world) => world,
         Err(error) => return Ok((never_performed(test, scene, &error.to_string()), None)),
     };

@@ -7,7 +7,7 @@ use crate::Env;
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_config::Campaign;
 use actcheck_data::ObjectModel;
-use actcheck_world::{self as world, RobotMeasures};
+use actcheck_world::{Robot, RobotMeasures};
 
 /// A solid of less than this is lighter than the air around it, which has 1.2 kg/m³ (1.225 kg/m³ at
 /// sea level by ISO 2533), and would float away; the lightest foam of packages has 10. Unit: kg/m³.
@@ -35,12 +35,10 @@ impl Env {
     /// Mass and size of the robot and of each model that the configuration names, one line each.
     pub fn masses_and_sizes(&self) -> String {
         let robot = &self.campaign.robot;
-        let of_robot = world::robot_measures(robot).map(|measured| {
-            let RobotMeasures {
-                mass_kg, size_m, ..
-            } = measured;
-            format!("{}: {}, {}\n", robot.name, mass(mass_kg), size(size_m))
-        });
+        let RobotMeasures {
+            mass_kg, size_m, ..
+        } = self.robot.measures();
+        let of_robot = format!("{}: {}, {}\n", robot.name, mass(mass_kg), size(size_m));
         let named = named_models(&self.campaign).into_iter();
         let of_models = named.map(|model| {
             let mass_kg = model.mass_kg + of_parts(model).map(|part| part.mass_kg).sum::<f64>();
@@ -51,12 +49,12 @@ impl Env {
                 size(model.size_m)
             )
         });
-        of_robot.into_iter().chain(of_models).collect()
+        std::iter::once(of_robot).chain(of_models).collect()
     }
 }
 
 /// Warnings (W056) about the robot and the models of a campaign whose mass or size can't be meant.
-pub(super) fn implausible(campaign: &Campaign) -> Diagnostics {
+pub(super) fn implausible(campaign: &Campaign, robot: Option<&Robot>) -> Diagnostics {
     let used = campaign.used_models();
     let models = campaign.models.values();
     let of_models = models
@@ -65,7 +63,8 @@ pub(super) fn implausible(campaign: &Campaign) -> Diagnostics {
             let found = faults_of(model).into_iter();
             found.map(move |(message, help)| warning(campaign, &model.name, message, help))
         });
-    of_models.chain(implausible_robot(campaign)).collect()
+    let of_robot = robot.map(|robot| implausible_robot(campaign, robot.measures()));
+    of_models.chain(of_robot.into_iter().flatten()).collect()
 }
 
 /// The faults of a model, with their help. One of its size makes its densities wrong, too.
@@ -161,11 +160,8 @@ fn implausible_size(model: &ObjectModel) -> Option<(String, &'static str)> {
 }
 
 /// Warnings about the robot's size, and about its mass for the load that it lifts.
-fn implausible_robot(campaign: &Campaign) -> Vec<Diagnostic> {
+fn implausible_robot(campaign: &Campaign, measured: RobotMeasures) -> Vec<Diagnostic> {
     let robot = &campaign.robot;
-    let Ok(measured) = world::robot_measures(robot) else {
-        return Vec::new();
-    };
     let RobotMeasures {
         mass_kg,
         size_m,

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use actcheck_base::{Below, Diagnostic, Diagnostics, Digest};
 use actcheck_config::Campaign;
 use actcheck_data::{Mesh, ObjectModel, Part, RobotProfile, Shape};
-use actcheck_world::{self as world, DecompositionFault};
+use actcheck_world::{self as world, DecompositionFault, Robot};
 
 /// Cache folder in the history's folder.
 const FOLDER: &str = "hulls";
@@ -115,20 +115,23 @@ pub fn proposed_robot(
     Ok(world::propose(&robot, hand).map_err(|error| error.diagnostic())?)
 }
 
-/// Finds the roles that the robot's profile leaves out, and limits the force of its grip to that of
-/// its motors.
+/// Finds the roles that the robot's profile leaves out, limits the force of its grip to that of its
+/// motors, and returns the compiled robot.
 ///
 /// # Errors
-/// [`world::WorldError`] if they can't be found.
-pub(super) fn complete_robot(campaign: &mut Campaign) -> Result<(), world::WorldError> {
+/// [`world::RobotError`] if they can't be found.
+pub(super) fn complete_robot(campaign: &mut Campaign) -> Result<Robot, world::RobotError> {
     if world::is_incomplete(&campaign.robot) {
         campaign.robot = Arc::new(world::complete(&campaign.robot)?.profile);
     }
-    let limit_n = world::grip_limit_n(&campaign.robot)?;
+    let mut robot = Robot::compile(&campaign.robot)?;
+    let limit_n = robot.grip_limit_n();
     if limit_n < campaign.robot.grip_force_n {
         Arc::make_mut(&mut campaign.robot).grip_force_n = limit_n;
+        // The links and joints don't depend on the force.
+        robot.profile = Arc::clone(&campaign.robot);
     }
-    Ok(())
+    Ok(robot)
 }
 
 fn decompose_with(cache: &mut HullCache, robot: &mut RobotProfile, faults: &mut Diagnostics) {

@@ -22,7 +22,9 @@ impl Env {
     pub fn starts(&self) -> Diagnostics {
         let mut found = Diagnostics::new();
         for test in 0..self.space.tests() {
-            let worlds: Vec<(Scene, World)> = self.some_scenes(test).filter_map(built).collect();
+            let scenes = self.some_scenes(test);
+            let worlds: Vec<(Scene, World)> =
+                scenes.filter_map(|scene| self.built(scene)).collect();
             let overlaps: Vec<String> = worlds
                 .iter()
                 .filter_map(|(_, world)| world.overlaps().first().map(ToString::to_string))
@@ -71,7 +73,8 @@ impl Env {
     pub fn check_starts(&self) -> Result<(), Diagnostics> {
         for test in 0..self.space.tests() {
             let (mut first, mut n_scenes) = (None, 0);
-            for (_, world) in self.some_scenes(test).filter_map(built) {
+            let scenes = self.some_scenes(test);
+            for (_, world) in scenes.filter_map(|scene| self.built(scene)) {
                 n_scenes += 1;
                 let overlap = world.overlaps().into_iter().next();
                 if overlap.is_none() {
@@ -110,6 +113,12 @@ impl Env {
             .filter_map(move |mut choices| scenario::draw(&self.space, test, &mut choices).ok())
     }
 
+    fn built(&self, scene: Scene) -> Option<(Scene, World)> {
+        world::build_with(&scene, &self.robot)
+            .ok()
+            .map(|world| (scene, world))
+    }
+
     /// The reason why the first action of a test can't be performed. At the start, the robot
     /// touches nothing.
     fn reason_not_to_begin(&self, test: usize, scene: &Scene, world: &World) -> Option<String> {
@@ -134,7 +143,3 @@ impl Env {
 const START: &str = "robot.profile";
 const MOVE_ROBOT: &str = "move the robot by `start_x_m`, `start_y_m` and `start_heading_rad` in `[robot]`, change `home` or \
     `mount_height_m` in its profile, or choose other furniture";
-
-fn built(scene: Scene) -> Option<(Scene, World)> {
-    world::build(&scene).ok().map(|world| (scene, world))
-}

@@ -4,10 +4,10 @@ use crate::description::{Joint, JointKind};
 
 /// Largest effort of joints for which it is unknown, as for those of MJCF and SDF. Units: newtons
 /// or newton metres.
-pub(super) const UNKNOWN_EFFORT: f64 = 100.0;
+pub const UNKNOWN_EFFORT: f64 = 100.0;
 
 /// Largest speeds of joints for which they are unknown. Units: rad/s, m/s. Those of a slow arm.
-pub(super) const UNKNOWN_SPEEDS: [f64; 2] = [1.0, 0.25];
+pub const UNKNOWN_SPEEDS: [f64; 2] = [1.0, 0.25];
 
 /// Widens the limits of joints that mimic others to the range of their couplings. A mechanism moves
 /// its links together: limits that contradict the coupling, such as those of a mirrored joint that

@@ -4,12 +4,11 @@ use std::collections::BTreeSet;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use crate::assumed::{UNKNOWN_EFFORT, UNKNOWN_SPEEDS};
 use crate::description::RobotModel;
 use crate::gripper::{Probe, links_of_fingers};
 use crate::kinematics::Mount;
 use crate::wrist;
-use crate::{BalancedJoint, Gripper, GripperFault, RobotError};
+use crate::{Gripper, GripperFault, Robot, RobotError};
 use actcheck_data::RobotProfile;
 
 /// Indices of the robot's joints by their role.
@@ -29,6 +28,7 @@ pub struct Layout {
 const OPENING_SLACK_M: f64 = 2e-3;
 
 /// The profile's joints and links, resolved in the URDF.
+#[derive(Debug, Clone)]
 pub struct Named {
     /// The joints by role.
     pub layout: Layout,
@@ -166,93 +166,21 @@ fn moved(offset_m: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Isometry3<f64> {
         * UnitQuaternion::from_euler_angles(roll, pitch, yaw)
 }
 
-/// Returns the largest force of each finger that the motors of a robot's gripper can give. Unit:
-/// newtons.
-///
-/// # Errors
-/// As [`check_robot`].
-pub fn grip_limit_n(profile: &RobotProfile) -> Result<f64, RobotError> {
-    let model = RobotModel::read(profile)?;
-    let gripper = Named::find(profile, &model)?.layout.gripper;
-    let of = |(joint, effort_per_n): (usize, f64)| model.joints[joint].effort / effort_per_n;
-    Ok(gripper.motors().map(of).fold(f64::INFINITY, f64::min))
-}
-
-/// Returns the force along the fingers of a robot's gripper, relative to that across them, with
-/// which they push a round object of this diameter out of the hand: fingers that turn are a wedge
-/// around it. Negative if they push it towards the palm. Friction with a greater coefficient holds
-/// the object. Returns `None` if they can't be closed on it. Unit: metres.
-///
-/// # Errors
-/// As [`check_robot`].
-pub fn outward_push(profile: &RobotProfile, diameter_m: f64) -> Result<Option<f64>, RobotError> {
-    let model = RobotModel::read(profile)?;
-    let named = Named::find(profile, &model)?;
-    Ok(crate::gripper::outward_push(
-        &model,
-        &named.layout.gripper,
-        named.finger_links,
-        named.grasp,
-        diameter_m,
-    ))
-}
-
-/// Returns the links of a robot whose collision shapes are between its fingers: nothing can be
-/// grasped there.
-///
-/// # Errors
-/// As [`check_robot`].
-pub fn shapes_between_fingers(profile: &RobotProfile) -> Result<Vec<String>, RobotError> {
-    let model = RobotModel::read(profile)?;
-    let named = Named::find(profile, &model)?;
-    Ok(crate::gripper::between_fingers(
-        &model,
-        named.finger_links,
-        named.grasp,
-    ))
-}
-
-/// Returns the joints of a robot's arm that can't hold its weight by their motors alone. They are
-/// simulated as balanced.
-///
-/// # Errors
-/// [`RobotError`] if the URDF can't be read.
-pub fn balanced_joints(profile: &RobotProfile) -> Result<Vec<BalancedJoint>, RobotError> {
-    RobotModel::read(profile).map(|model| model.balanced)
-}
-
-/// Returns the joints with a role whose largest effort is 0 in the URDF, and so unknown, and the
-/// effort that they are simulated with. Unit: newtons or newton metres.
-///
-/// # Errors
-/// [`RobotError`] if the URDF can't be read.
-pub fn assumed_efforts(profile: &RobotProfile) -> Result<(Vec<String>, f64), RobotError> {
-    RobotModel::read(profile).map(|model| (model.assumed, UNKNOWN_EFFORT))
-}
-
-/// As [`assumed_efforts`], for joints whose largest speed is 0. Units: rad/s for those that turn,
-/// m/s for those that slide.
-///
-/// # Errors
-/// [`RobotError`] if the URDF can't be read.
-pub fn assumed_speeds(profile: &RobotProfile) -> Result<(Vec<String>, [f64; 2]), RobotError> {
-    RobotModel::read(profile).map(|model| (model.assumed_speeds, UNKNOWN_SPEEDS))
-}
-
-/// Checks that a profile matches its URDF, without simulating.
-///
-/// # Errors
-/// [`RobotError`] for the first missing or unsupported element.
-pub fn check_robot(profile: &RobotProfile) -> Result<(), RobotError> {
-    let model = RobotModel::read(profile)?;
-    let widest_m = Named::find(profile, &model)?.layout.gripper.widest_m();
-    if profile.max_opening_m > widest_m + OPENING_SLACK_M {
-        let name = profile.urdf.name.to_string();
-        let fault = GripperFault::TooNarrow {
-            stated_m: profile.max_opening_m,
-            widest_m,
-        };
-        return Err(RobotError::Gripper { name, fault });
+impl Robot {
+    /// Checks that the fingers open as wide as the profile states.
+    ///
+    /// # Errors
+    /// [`GripperFault::TooNarrow`] if they don't.
+    pub fn check(&self) -> Result<(), RobotError> {
+        let (profile, widest_m) = (&self.profile, self.named.layout.gripper.widest_m());
+        if profile.max_opening_m > widest_m + OPENING_SLACK_M {
+            let name = profile.urdf.name.to_string();
+            let fault = GripperFault::TooNarrow {
+                stated_m: profile.max_opening_m,
+                widest_m,
+            };
+            return Err(RobotError::Gripper { name, fault });
+        }
+        Ok(())
     }
-    Ok(())
 }

@@ -12,6 +12,7 @@ mod counterweight;
 mod description;
 mod error;
 mod factor;
+mod folding;
 mod gripper;
 pub mod ik;
 mod inertia;
@@ -23,12 +24,13 @@ mod mechanism;
 mod needed;
 mod pieces;
 mod propose;
-mod resolved;
+mod robot;
 mod self_contact;
 mod start;
 mod views;
 mod wrist;
 
+pub use assumed::{UNKNOWN_EFFORT, UNKNOWN_SPEEDS};
 pub use body::RobotBody;
 pub use counterweight::BalancedJoint;
 pub use description::{Joint, JointKind, Link, RobotModel};
@@ -37,13 +39,9 @@ pub use factor::Factor;
 pub use gripper::Gripper;
 pub use inertia::{Dynamics, Inertias, Twist, inertias};
 pub use kinematics::{GRAVITY, Kinematics, Mount, axis_in_world};
-pub use layout::{
-    Layout, Named, assumed_efforts, assumed_speeds, balanced_joints, check_robot, grip_limit_n,
-    outward_push, shapes_between_fingers,
-};
-pub use measures::{RobotMeasures, robot_measures};
+pub use layout::{Layout, Named};
+pub use measures::RobotMeasures;
 pub use propose::{FingerJoint, Proposal, UnknownHand, complete, is_incomplete, propose};
-pub use resolved::{Resolved, resolved};
+pub use robot::Robot;
 pub use self_contact::SelfContact;
 pub use start::geometry;
-pub use views::robot_views;

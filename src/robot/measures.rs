@@ -1,11 +1,8 @@
 //! Mass and size of a robot, and the load that its arm lifts, without a simulation.
 
-use std::sync::Arc;
-
 use crate::counterweight::{N_POSTURES, position_in};
-use crate::resolved::resolved;
-use crate::{GRAVITY, Kinematics, RobotError, geometry};
-use actcheck_data::{LEAST_LINK_KG, Part, Pose, RobotProfile, RobotStart, bounds};
+use crate::{GRAVITY, Kinematics, Robot};
+use actcheck_data::{LEAST_LINK_KG, Part, Pose, bounds};
 
 /// A joint with a shorter lever carries nothing of the load. Unit: metres, or 1.
 const LEVER_M: f64 = 1e-3;
@@ -24,51 +21,44 @@ pub struct RobotMeasures {
     pub lift_kg: Option<f64>,
 }
 
-/// Measures a robot.
-///
-/// # Errors
-/// As [`geometry`].
-pub fn robot_measures(profile: &Arc<RobotProfile>) -> Result<RobotMeasures, RobotError> {
-    let start = RobotStart {
-        profile: Arc::clone(profile),
-        base: [0.0; 3],
-        root_height_m: profile.mount_height_m,
-        knows: Arc::new([]),
-    };
-    let (kinematics, layout, home) = geometry(&start)?;
-    let model = Arc::clone(&resolved(profile)?.model);
-    // Links without mass and shapes only join others; the engine needs some mass for them.
-    let is_real = |mass_kg: f64, is_bare: bool| mass_kg > LEAST_LINK_KG || !is_bare;
-    let links = model.links.iter();
-    let mass_kg = links
-        .filter(|link| is_real(link.mass, link.solids.is_empty()))
-        .map(|link| link.mass)
-        .sum();
-    let solids: Vec<Part> = kinematics
-        .solids(&home)
-        .into_iter()
-        .map(|(pose, shape)| Part {
-            pose: Pose::from_isometry(&pose),
-            shape,
-        })
-        .collect();
-    let size_m = match solids.as_slice() {
-        [] => [0.0; 3],
-        solids => {
-            let (low, high) = bounds(solids);
-            (high - low).into()
+impl Robot {
+    /// Measures the robot.
+    pub fn measures(&self) -> RobotMeasures {
+        let (kinematics, layout, home) = self.at(&self.start_at_origin());
+        let model = &self.model;
+        // Links without mass and shapes only join others; the engine needs some mass for them.
+        let is_real = |mass_kg: f64, is_bare: bool| mass_kg > LEAST_LINK_KG || !is_bare;
+        let links = model.links.iter();
+        let mass_kg = links
+            .filter(|link| is_real(link.mass, link.solids.is_empty()))
+            .map(|link| link.mass)
+            .sum();
+        let solids: Vec<Part> = kinematics
+            .solids(&home)
+            .into_iter()
+            .map(|(pose, shape)| Part {
+                pose: Pose::from_isometry(&pose),
+                shape,
+            })
+            .collect();
+        let size_m = match solids.as_slice() {
+            [] => [0.0; 3],
+            solids => {
+                let (low, high) = bounds(solids);
+                (high - low).into()
+            }
+        };
+        let is_unknown = |idx: &usize| model.assumed.contains(&model.joints[*idx].name);
+        let lift_kg = match layout.arm.iter().any(is_unknown) {
+            true => None,
+            false => lift_kg(&kinematics, &layout.arm, &home),
+        };
+        RobotMeasures {
+            mass_kg,
+            size_m,
+            lift_kg,
         }
-    };
-    let is_unknown = |idx: &usize| model.assumed.contains(&model.joints[*idx].name);
-    let lift_kg = match layout.arm.iter().any(is_unknown) {
-        true => None,
-        false => lift_kg(&kinematics, &layout.arm, &home),
-    };
-    Ok(RobotMeasures {
-        mass_kg,
-        size_m,
-        lift_kg,
-    })
+    }
 }
 
 /// The load that every joint of an arm holds in `home` and in postures spread over its range.
@@ -96,8 +86,11 @@ fn lift_kg(kinematics: &Kinematics, arm: &[usize], home: &[f64]) -> Option<f64> 
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
     use actcheck_base::{Files, Source};
+    use actcheck_data::RobotProfile;
     use std::path::Path;
 
     /// An arm of one beam of `mass_kg`, 0.5 m long, with two fingers of 50 g.
@@ -152,7 +145,9 @@ mod tests {
     /// · 0.5 m) for a load at 0.5 m.
     #[test]
     fn an_arm_lifts_as_much_as_its_motors_leave() {
-        let measured = robot_measures(&beam(2.0, 25.0)).expect("it is valid");
+        let measured = Robot::compile(&beam(2.0, 25.0))
+            .expect("it is valid")
+            .measures();
         assert!((measured.mass_kg - 2.1).abs() < 1e-9, "{measured:?}");
         let expected = 25.0 / (GRAVITY * 0.5) - (2.0 * 0.25 + 0.1 * 0.5) / 0.5;
         let lift_kg = measured.lift_kg.expect("its effort is known");
@@ -162,7 +157,9 @@ mod tests {
         );
         let across_m = measured.size_m[1];
         assert!((0.02..0.101).contains(&across_m), "{measured:?}");
-        let unknown = robot_measures(&beam(2.0, 0.0)).expect("it is valid");
+        let unknown = Robot::compile(&beam(2.0, 0.0))
+            .expect("it is valid")
+            .measures();
         assert_eq!(unknown.lift_kg, None);
     }
 }

@@ -6,8 +6,7 @@ use nalgebra::Isometry3;
 
 use crate::description::RobotModel;
 use crate::layout::{Layout, Named};
-use crate::resolved::{Resolved, resolved};
-use crate::{Kinematics, RobotError};
+use crate::{Kinematics, Robot, RobotError};
 use actcheck_data::{Pose, RobotProfile, RobotStart};
 
 /// Returns a robot's geometry, layout and home posture, without a simulation.
@@ -15,19 +14,30 @@ use actcheck_data::{Pose, RobotProfile, RobotStart};
 /// # Errors
 /// [`RobotError`] if profile and URDF don't match.
 pub fn geometry(start: &RobotStart) -> Result<(Kinematics, Layout, Vec<f64>), RobotError> {
-    let resolved = resolved(&start.profile)?;
-    let Resolved {
-        model,
-        named,
-        passing,
-        hand,
-    } = resolved.as_ref();
-    let positions = home(&start.profile, model, named, start.base);
-    let root = root_of(start, &named.layout);
-    let kinematics = Kinematics::new(Arc::clone(model), root, named.grasp, named.camera)
-        .with_passing(passing.clone(), hand.clone())
-        .with_followers(&named.layout.gripper);
-    Ok((kinematics, named.layout.clone(), positions))
+    Ok(Robot::compile(&start.profile)?.at(start))
+}
+
+impl Robot {
+    /// Returns its geometry, layout and home posture where a scene puts it.
+    pub fn at(&self, start: &RobotStart) -> (Kinematics, Layout, Vec<f64>) {
+        let (model, named) = (&self.model, &self.named);
+        let positions = home(&self.profile, model, named, start.base);
+        let root = root_of(start, &named.layout);
+        let kinematics = Kinematics::new(Arc::clone(model), root, named.grasp, named.camera)
+            .with_passing(self.passing.clone(), self.hand.clone())
+            .with_followers(&named.layout.gripper);
+        (kinematics, named.layout.clone(), positions)
+    }
+
+    /// Returns its start at the origin of a world, on its mount.
+    pub(crate) fn start_at_origin(&self) -> RobotStart {
+        RobotStart {
+            profile: Arc::clone(&self.profile),
+            base: [0.0; 3],
+            root_height_m: self.profile.mount_height_m,
+            knows: Arc::new([]),
+        }
+    }
 }
 
 /// Returns the home posture, with the base at its start pose and the fingers half open.

@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use crate::robot::Robot;
+use crate::robot::SimulatedRobot;
 use actcheck_robot::{Twist, inertias};
 
 /// Length of the push: a substep of the default physics. Unit: seconds.
@@ -16,7 +16,7 @@ pub(super) const LIGHT_KG: f64 = 0.8;
 /// its own mass, which then slips. With the shipped arm, that begins at 0.7 kg.
 pub(super) const CARRIED_SHARE: f64 = 0.5;
 
-impl Robot {
+impl SimulatedRobot {
     /// Returns the least mass that a push at the grasp frame meets in any direction: the robot's
     /// effective mass there, with the resistance of its motors during the push. Returns `None` if
     /// the hand can't move alone.

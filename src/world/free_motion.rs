@@ -11,7 +11,7 @@ use rapier3d::prelude::PhysicsWorld;
 use crate::assemble::{STOP_DAMPING, STOP_FREQUENCY_HZ, WIDEST_RANGE};
 use crate::drive::VelocityConstraint;
 use crate::ownership::{Hand, Ownership};
-use crate::robot::Robot;
+use crate::robot::SimulatedRobot;
 use actcheck_robot::Factor;
 use actcheck_robot::{Inertias, Twist, inertias};
 
@@ -78,7 +78,7 @@ impl Equations {
     }
 }
 
-impl Robot {
+impl SimulatedRobot {
     /// Moves the joints by a step of the engine's length, with the engine's substeps, without
     /// moving the links. Joints that the engine moves keep their velocities.
     pub(super) fn move_freely(&mut self, engine: &PhysicsWorld) {

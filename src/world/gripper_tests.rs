@@ -1,13 +1,23 @@
 //! The opening of grippers with known closed forms.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use crate::robot::tests::alone;
 use crate::{Joint, SelfContact, World, ik};
 use actcheck_base::{Files, Source};
 use actcheck_data::RobotProfile;
 use actcheck_robot::RobotModel;
-use actcheck_robot::{Named, check_robot, grip_limit_n, outward_push};
+use actcheck_robot::{Named, Robot, RobotError};
+
+fn compiled(profile: &RobotProfile) -> Robot {
+    Robot::compile(&Arc::new(profile.clone())).expect("the robot is valid")
+}
+
+/// Compiles and checks the robot of a profile.
+pub(crate) fn checked(profile: &RobotProfile) -> Result<(), RobotError> {
+    Robot::compile(&Arc::new(profile.clone()))?.check()
+}
 
 /// The profile with another URDF.
 fn with_urdf(profile: RobotProfile, text: String) -> RobotProfile {
@@ -175,15 +185,14 @@ fn fingers_that_turn_push_a_cylinder_out_as_calculated() {
         (4, slides, 0.0),
     ];
     for (idx, diameter_m, half_angle) in cases {
-        let found =
-            outward_push(&hands().swap_remove(idx).0, diameter_m).expect("the hand is valid");
+        let found = compiled(&hands().swap_remove(idx).0).outward_push(diameter_m);
         let expected = libm::tan(half_angle);
         assert!(
             found.is_some_and(|found| (found - expected).abs() < 1e-3),
             "hand {idx}: {found:?}, not {expected}"
         );
     }
-    let too_wide = outward_push(&hands().swap_remove(4).0, 0.2).expect("the hand is valid");
+    let too_wide = compiled(&hands().swap_remove(4).0).outward_push(0.2);
     assert_eq!(too_wide, None);
 }
 
@@ -218,7 +227,7 @@ fn all_hands_open_and_close() {
 fn a_gripper_that_cannot_be_measured_is_refused() {
     let left = turning(0.0, 0.6);
     let of = |profile: &RobotProfile| {
-        check_robot(profile)
+        checked(profile)
             .expect_err("it can't be measured")
             .diagnostic()
     };
@@ -343,7 +352,7 @@ fn fingers_that_overlap_do_not_forbid_postures_of_the_arm() {
 #[test]
 fn the_grip_is_as_strong_as_its_motors() {
     let (left, right) = (turning(0.0, 0.6), turning(-0.6, 0.0));
-    let of = |profile: &RobotProfile| grip_limit_n(profile).expect("it has a gripper");
+    let of = |profile: &RobotProfile| compiled(profile).grip_limit_n();
     // 20 Nm at a mean lever of the way of a fingertip by the turn of its hinge.
     let lever_m = (turned(0.6) - turned(0.0)) / 0.6;
     let own_motors = of(&hand(&left, &right, &["left", "right"]));

@@ -54,7 +54,7 @@ pub use reach::Shortcuts;
 pub use recorder::{Contact, Course, Record, Tracks};
 pub use sense::Sighting;
 pub use settle::Settling;
-pub use simulation::{Command, Observation, World, build};
+pub use simulation::{Command, Observation, World, build, build_with};
 pub use suction::would_seal;
 
 pub use actcheck_geometry::{
@@ -63,9 +63,8 @@ pub use actcheck_geometry::{
 };
 pub use actcheck_robot::{
     BalancedJoint, Dynamics, GRAVITY, Gripper, GripperFault, Joint, JointKind, Kinematics, Layout,
-    Proposal, RobotBody, RobotError, RobotMeasures, SelfContact, assumed_efforts, assumed_speeds,
-    balanced_joints, check_robot, complete, geometry, grip_limit_n, ik, is_incomplete,
-    outward_push, propose, robot_measures, robot_views, shapes_between_fingers,
+    Proposal, Robot, RobotBody, RobotError, RobotMeasures, SelfContact, UNKNOWN_EFFORT,
+    UNKNOWN_SPEEDS, complete, geometry, ik, is_incomplete, propose,
 };
 
 /// Version of the physics: the same scene and commands give the same bits only with the same

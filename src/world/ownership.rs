@@ -14,7 +14,7 @@ use rapier3d::prelude::{
 };
 
 use crate::assemble::insert_joint;
-use crate::robot::Robot;
+use crate::robot::SimulatedRobot;
 use actcheck_geometry::{from_pose, to_pose, to_real};
 use actcheck_robot::Gripper;
 use actcheck_robot::RobotModel;
@@ -88,7 +88,7 @@ impl Hand {
 /// five couplings presses with 5 N.
 const COUPLED_ITERATIONS: usize = 8;
 
-impl Robot {
+impl SimulatedRobot {
     /// Returns whether the engine moves a joint.
     pub(super) fn engine_moves(&self, joint: usize) -> bool {
         match self.ownership {

@@ -15,12 +15,12 @@ use crate::{Kinematics, WorldError};
 use actcheck_data::{JointState, RobotProfile, RobotStart};
 use actcheck_geometry::Ball;
 use actcheck_robot::Layout;
+use actcheck_robot::Robot;
 use actcheck_robot::Twist;
 use actcheck_robot::{Joint, RobotModel};
-use actcheck_robot::{Resolved, resolved};
 
 /// The robot, its bodies in the engine, and its joint controllers.
-pub struct Robot {
+pub struct SimulatedRobot {
     /// Its profile.
     pub profile: Arc<RobotProfile>,
     /// Its links and joints.
@@ -84,16 +84,24 @@ fn balls_of_shapes(engine: &PhysicsWorld, body: RigidBodyHandle) -> Vec<Bounding
         .collect()
 }
 
-impl Robot {
+impl SimulatedRobot {
     /// Inserts the robot into the engine, in its home posture.
     ///
     /// # Errors
     /// [`WorldError`] if profile and URDF don't match.
-    pub fn insert(engine: &mut PhysicsWorld, start: &RobotStart) -> Result<Self, WorldError> {
-        let profile = start.profile.clone();
-        let resolved = resolved(&profile)?;
-        let Resolved { model, named, .. } = resolved.as_ref();
-        let (kinematics, _, positions) = actcheck_robot::geometry(start)?;
+    pub fn insert(
+        engine: &mut PhysicsWorld,
+        robot: &Robot,
+        start: &RobotStart,
+    ) -> Result<Self, WorldError> {
+        let Robot {
+            profile,
+            model,
+            named,
+            ..
+        } = robot;
+        let profile = Arc::clone(profile);
+        let (kinematics, _, positions) = robot.at(start);
         let bodies = insert_links(
             engine,
             model,
@@ -404,11 +412,11 @@ pub(super) mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::gripper_tests::checked;
     use crate::{World, build, ik};
     use actcheck_base::Files;
     use actcheck_data::{Camera, Choices, Odometry, Physics, Scene, Sensing};
     use actcheck_geometry::from_pose;
-    use actcheck_robot::check_robot;
 
     pub(crate) fn lonely() -> World {
         let path = Path::new("models/robots/mobile_manipulator.toml");
@@ -605,7 +613,7 @@ pub(super) mod tests {
     /// A panic about `min > max` ended the run of a robot whose state was not a number.
     #[test]
     fn a_joint_whose_state_or_limits_are_not_numbers_is_a_fault() {
-        type Spoil = fn(&mut Robot, usize);
+        type Spoil = fn(&mut SimulatedRobot, usize);
         let spoils: [Spoil; 5] = [
             |robot, joint| robot.velocities[joint] = f64::NAN,
             |robot, joint| robot.positions[joint] = f64::INFINITY,
@@ -630,7 +638,7 @@ pub(super) mod tests {
     fn a_profile_that_names_a_missing_joint_is_refused_with_help() {
         let mut profile = lonely().robot.profile.as_ref().clone();
         profile.arm_joints[1] = "arm_flx_joint".to_owned();
-        let refused = check_robot(&profile)
+        let refused = checked(&profile)
             .expect_err("the joint is missing")
             .diagnostic();
         assert_eq!(
@@ -639,7 +647,7 @@ pub(super) mod tests {
         );
         profile.tree = Arc::default();
         assert_eq!(
-            check_robot(&profile)
+            checked(&profile)
                 .expect_err("it has no links")
                 .diagnostic()
                 .code,

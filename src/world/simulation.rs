@@ -19,11 +19,12 @@ use crate::patches::Patch;
 use crate::proximity::ProximityCache;
 use crate::reach::Reach;
 use crate::recorder::Recorder;
-use crate::robot::Robot;
+use crate::robot::SimulatedRobot;
 use crate::suction::Cup;
 use crate::{Fault, Kinematics, Layout, Poison, WorldError, fault};
 use actcheck_data::{CONTROL_HZ, Camera, KnownKind, Pose, RobotProfile, Scene, Sensing};
 use actcheck_geometry::{from_pose, from_vector, to_vector};
+use actcheck_robot::Robot;
 use actcheck_scenario::FloorPlan;
 
 /// A command to the robot's controllers. Positions are clamped to the joint limits; the controllers
@@ -66,7 +67,7 @@ pub struct Observation {
 pub struct World {
     pub(super) engine: PhysicsWorld,
     pub(super) objects: Vec<Object>,
-    pub(super) robot: Robot,
+    pub(super) robot: SimulatedRobot,
     /// Its suction cup; `None` if its gripper has fingers.
     pub(super) cup: Option<Cup>,
     pub(super) sensing: Sensing,
@@ -115,9 +116,21 @@ struct Watch {
 /// # Errors
 /// [`WorldError`] if the robot's files or the physics settings are unusable.
 pub fn build(scene: &Scene) -> Result<World, WorldError> {
+    build_with(scene, &Robot::compile(&scene.robot.profile)?)
+}
+
+/// As [`build`], with the scene's robot, which was compiled before. If the profile of the scene is
+/// another one, its robot is compiled.
+///
+/// # Errors
+/// As [`build`].
+pub fn build_with(scene: &Scene, robot: &Robot) -> Result<World, WorldError> {
+    if !Arc::ptr_eq(&robot.profile, &scene.robot.profile) {
+        return build(scene);
+    }
     let mut engine = engine(&scene.physics)?;
     let floor = add_floor(&mut engine);
-    let robot = Robot::insert(&mut engine, &scene.robot)?;
+    let robot = SimulatedRobot::insert(&mut engine, robot, &scene.robot)?;
     let mut objects: Vec<Object> = scene
         .objects
         .iter()
@@ -167,7 +180,7 @@ pub fn build(scene: &Scene) -> Result<World, WorldError> {
 }
 
 /// Returns the bodies that can move with their names in traces: objects, then links with shapes.
-fn tracks(objects: &[Object], robot: &Robot) -> Vec<(String, RigidBodyHandle)> {
+fn tracks(objects: &[Object], robot: &SimulatedRobot) -> Vec<(String, RigidBodyHandle)> {
     let objects = objects
         .iter()
         .filter(|object| !object.fixed || object.slides)

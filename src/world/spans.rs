@@ -1,10 +1,10 @@
 //! How far the joints can move in a control tick: a bound from their speeds and their motors.
 
 use crate::motor::Motor;
-use crate::robot::Robot;
+use crate::robot::SimulatedRobot;
 use actcheck_robot::Joint;
 
-impl Robot {
+impl SimulatedRobot {
     /// Returns how far each joint can move in a control tick: at its speed now or at that of its
     /// setpoint, and to its setpoint. Units: metres or radians.
     ///

@@ -17,10 +17,12 @@ mod opening;
 mod sides;
 mod sliding;
 mod squeeze;
+mod surface;
 mod table;
 
 pub(crate) use between_fingers::between_fingers;
-pub(crate) use gap::{Probe, Surface};
+pub(crate) use gap::Probe;
 pub use opening::Gripper;
 pub(crate) use sides::links_of_fingers;
 pub(crate) use squeeze::{outward_push, pushes};
+pub(crate) use surface::Surface;
