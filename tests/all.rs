@@ -35,6 +35,7 @@ mod file_access;
 mod findings;
 mod findings_of_rules;
 mod floors;
+mod foreign_cases;
 mod foreign_text;
 mod formats;
 mod fuzz_corpus;

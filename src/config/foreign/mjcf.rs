@@ -958,6 +958,25 @@ mod tests {
         assert_eq!(tree.joint("j").map(|joint| joint.effort), Some(4.0));
     }
 
+    /// The gain and the bias of a class of servos reach `<general>`: its signal is a position, and
+    /// not a force.
+    #[test]
+    fn an_actuator_has_the_kind_of_its_defaults() {
+        let bodies = "<body name=\"a\"><joint name=\"j\"/><geom type=\"sphere\" size=\"0.1\"/></body>";
+        let effort = |defaults: &str| {
+            let more = format!(
+                "<default><default class=\"c\">{defaults}</default></default>\
+                 <actuator><general class=\"c\" joint=\"j\" ctrlrange=\"-0.5 0.5\" gear=\"2\"/></actuator>"
+            );
+            let tree = read(bodies, &more).expect("it is valid");
+            tree.joint("j").map(|joint| joint.effort)
+        };
+        let servo = effort("<position kp=\"500\" forcerange=\"-3 3\"/>");
+        assert_eq!(servo, Some(6.0));
+        assert_eq!(effort("<motor forcerange=\"-3 3\"/>"), Some(1.0));
+        assert_eq!(effort("<position kp=\"9\"/><motor/>"), Some(1.0));
+    }
+
     /// A box between two points is as deep as it is wide, and a mesh of vertices alone is their
     /// hull.
     #[test]

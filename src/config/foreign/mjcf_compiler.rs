@@ -384,6 +384,7 @@ impl Compiler {
                     .attributes()
                     .map(|value| (value.name().to_owned(), value.value().to_owned())),
             );
+            state_gains(element.tag_name().name(), values);
         }
         self.defaults.insert(name.to_owned(), own.clone());
         for nested in xml::children(node, "default") {
@@ -585,6 +586,35 @@ fn kind(element: &str) -> &str {
         ACTUATORS[0]
     } else {
         element
+    }
+}
+
+/// States the gain and the bias of a kind of actuators among defaults, as those of a general
+/// actuator: an element of another kind has them, too.
+fn state_gains(kind: &str, values: &mut Values) {
+    let of = |key: &str, usual: &str| values.get(key).map_or(usual, String::as_str).to_owned();
+    let (proportional, damping) = (of("kp", "1"), of("kv", "0"));
+    let (gain, bias, of_bias) = match kind {
+        "motor" => ("1".to_owned(), "none", String::new()),
+        "adhesion" => (of("gain", "1"), "none", String::new()),
+        "position" | "intvelocity" => {
+            let of_bias = format!("0 -{proportional} -{damping}");
+            (proportional, "affine", of_bias)
+        }
+        "velocity" => {
+            let gain = of("kv", "1");
+            let of_bias = format!("0 0 -{gain}");
+            (gain, "affine", of_bias)
+        }
+        _ => return,
+    };
+    for (key, value) in [
+        ("gaintype", "fixed".to_owned()),
+        ("gainprm", gain),
+        ("biastype", bias.to_owned()),
+        ("biasprm", of_bias),
+    ] {
+        values.insert(key.to_owned(), value);
     }
 }
 
