@@ -163,7 +163,7 @@ fn wrong_values(expected: &Expected, folder: &Path) -> Vec<String> {
             .flat_map(|world| &world.furniture)
             .find(|piece| piece.name == *name)
             .unwrap_or_else(|| panic!("there is no furniture {name}"));
-        let at = [piece.pose.x, piece.pose.y, 0.0];
+        let at = [piece.pose.position[0], piece.pose.position[1], 0.0];
         let [x, y] = wanted.at_m;
         comparison(&mut faults, name)("place", Some([x, y, 0.0]), at);
     }
@@ -185,7 +185,7 @@ fn wrong_robot(wanted: &Robot, env: &Env) -> Vec<String> {
     let mut compare = comparison(&mut faults, "the robot");
     let force = wanted.grip_force_n.map(|force| [force; 3]);
     compare("grip force", force, [robot.grip_force_n; 3]);
-    let measured = actcheck::world::robot_measures(robot).unwrap();
+    let measured = env.robot.measures();
     let mass = wanted.mass_kg.map(|kg| [kg; 3]);
     compare("mass", mass, [measured.mass_kg; 3]);
     for (name, effort) in &wanted.effort {
