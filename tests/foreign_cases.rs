@@ -145,11 +145,16 @@ fn wrong_values(expected: &Expected, folder: &Path) -> Vec<String> {
     for (name, wanted) in &expected.models {
         let found = env.campaign.models.get(name);
         let found = found.unwrap_or_else(|| panic!("there is no model {name}"));
-        let mut compare = comparison(&mut faults, name);
-        compare("mass", wanted.mass_kg.map(|kg| [kg; 3]), [found.mass_kg; 3]);
-        compare("size", wanted.size_m, found.size_m);
+        let mass = wanted.mass_kg.map(|kg| [kg; 3]);
+        compare(&mut faults, (name, "mass"), mass, [found.mass_kg; 3]);
+        compare(&mut faults, (name, "size"), wanted.size_m, found.size_m);
         let friction = wanted.friction.map(|friction| [friction; 3]);
-        compare("friction", friction, [found.friction; 3]);
+        compare(
+            &mut faults,
+            (name, "friction"),
+            friction,
+            [found.friction; 3],
+        );
         let moving: Vec<&str> = found.moving.iter().map(|part| &*part.name).collect();
         if wanted.fixed.is_some_and(|fixed| fixed != found.fixed)
             || wanted.moving.as_ref().is_some_and(|names| *names != moving)
@@ -165,7 +170,7 @@ fn wrong_values(expected: &Expected, folder: &Path) -> Vec<String> {
             .unwrap_or_else(|| panic!("there is no furniture {name}"));
         let at = [piece.pose.position[0], piece.pose.position[1], 0.0];
         let [x, y] = wanted.at_m;
-        comparison(&mut faults, name)("place", Some([x, y, 0.0]), at);
+        compare(&mut faults, (name, "place"), Some([x, y, 0.0]), at);
     }
     faults.extend(wrong_robot(&expected.robot, &env));
     faults
@@ -182,32 +187,40 @@ fn wrong_robot(wanted: &Robot, env: &Env) -> Vec<String> {
             faults.push(format!("the robot has {found:?}"));
         }
     }
-    let mut compare = comparison(&mut faults, "the robot");
+    let of = "the robot";
     let force = wanted.grip_force_n.map(|force| [force; 3]);
-    compare("grip force", force, [robot.grip_force_n; 3]);
+    compare(
+        &mut faults,
+        (of, "grip force"),
+        force,
+        [robot.grip_force_n; 3],
+    );
     let measured = env.robot.measures();
     let mass = wanted.mass_kg.map(|kg| [kg; 3]);
-    compare("mass", mass, [measured.mass_kg; 3]);
+    compare(&mut faults, (of, "mass"), mass, [measured.mass_kg; 3]);
     for (name, effort) in &wanted.effort {
         let joint = robot.tree.joint(name);
         let joint = joint.unwrap_or_else(|| panic!("there is no joint {name}"));
-        compare(name, Some([*effort; 3]), [joint.effort; 3]);
+        compare(
+            &mut faults,
+            (of, name),
+            Some([*effort; 3]),
+            [joint.effort; 3],
+        );
     }
     faults
 }
 
-/// Reports values that differ by more than 1e-4.
-fn comparison<'a>(
-    faults: &'a mut Vec<String>,
-    of: &'a str,
-) -> impl FnMut(&str, Option<[f64; 3]>, [f64; 3]) + 'a {
-    move |value, wanted, found| {
-        let Some(wanted) = wanted else {
-            return;
-        };
-        if wanted.iter().zip(found).any(|(a, b)| (a - b).abs() > 1e-4) {
-            faults.push(format!("{value} of {of} is {found:?}, not {wanted:?}"));
-        }
+/// Reports a value of a thing that differs by more than 1e-4.
+fn compare(
+    faults: &mut Vec<String>,
+    (of, value): (&str, &str),
+    wanted: Option<[f64; 3]>,
+    found: [f64; 3],
+) {
+    let Some(wanted) = wanted else { return };
+    if wanted.iter().zip(found).any(|(a, b)| (a - b).abs() > 1e-4) {
+        faults.push(format!("{value} of {of} is {found:?}, not {wanted:?}"));
     }
 }
 
