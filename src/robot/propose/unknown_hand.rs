@@ -17,6 +17,8 @@ use actcheck_data::{RobotProfile, Suction};
 
 /// Fewest joints of an arm whose hand has no names of fingers.
 const FEWEST_BEFORE_HAND: usize = 3;
+/// Most joints between a palm and the outer links of its fingers.
+const LONGEST_FINGER: usize = 4;
 /// Distance of the frame from a hand without shapes. Unit: metres.
 const AHEAD_M: f64 = 0.1;
 /// The tool that takes the place of the fingers while the postures are found.
@@ -76,10 +78,12 @@ pub(super) fn find(
     let is_wanted = |palm: &usize| wanted.is_none_or(|wanted| is_called(&model, *palm, wanted));
     let named = groups.keys().copied().filter(is_wanted);
     let known = named.max_by_key(|palm| (rank(&model, *palm), std::cmp::Reverse(*palm)));
+    let known = known.map(|palm| below_fingers(&model, palm, groups.keys()));
     let Some(palm) = known.or_else(|| end_of_arm(&model, wanted)) else {
         return Err(NoHand::Gripper(fault));
     };
     let beyond = beyond(&model, palm);
+    let inside: BTreeSet<usize> = beyond.iter().map(|joint| joint + 1).collect();
     let frame = ahead(&model, palm, &beyond);
     let (roll, pitch, yaw) = frame.rotation.euler_angles();
     let hand = UnknownHand {
@@ -102,7 +106,12 @@ pub(super) fn find(
         profile: profile.with_cup(PLACEHOLDER),
         palm,
         notes: BTreeMap::new(),
-        others: others_than(&model, &groups, palm),
+        others: {
+            let others = groups
+                .into_iter()
+                .filter(|(other, _)| !inside.contains(other));
+            others_than(&model, &others.collect(), palm)
+        },
         score: 0.0,
     };
     Ok((model, placeholder, hand))
@@ -121,6 +130,25 @@ pub(super) fn without_placeholder(profile: RobotProfile, bare: &RobotProfile) ->
         suction: None,
         ..profile
     }
+}
+
+/// The link that carries several fingers, if this one is part of a finger: fingers of which only the
+/// outer links have such names count as hands of their own.
+fn below_fingers<'a>(
+    model: &RobotModel,
+    palm: usize,
+    palms: impl Iterator<Item = &'a usize>,
+) -> usize {
+    let own = chain(model, palm);
+    let n_common = |other: &usize| {
+        let path = chain(model, *other);
+        own.iter().zip(&path).take_while(|(a, b)| a == b).count()
+    };
+    let forks = palms.filter(|other| **other != palm).map(n_common);
+    let fork = forks
+        .filter(|n| *n >= FEWEST_BEFORE_HAND && own.len() - n <= LONGEST_FINGER)
+        .min();
+    fork.map_or(palm, |n| own[n - 1] + 1)
 }
 
 /// The link at the end of the longest arm: the last one from which several chains go on, or that
