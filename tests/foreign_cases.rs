@@ -1,7 +1,7 @@
 //! Files of others that were once read wrongly: every folder of `tests/models/cases` is a case.
 //!
-//! A case has a configuration `c.toml`, the files that it names, and `expected.toml`: what
-//! `new robot` and `check` must print, and the values that must be read. A new case needs no Rust.
+//! A case has a configuration `c.toml`, the files that it names, and `expected.toml`: the
+//! words that `new robot` and `check` must print, and the values that must be read. A new case needs no Rust.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -61,7 +61,7 @@ struct Robot {
     mass_kg: Option<f64>,
 }
 
-/// Where a piece of furniture stands. Unit: metres. Frame: the map.
+/// Place of a piece of furniture. Unit: metres. Frame: the map.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Piece {
@@ -99,7 +99,7 @@ fn faults_of(case: &Path) -> Vec<String> {
         .collect()
 }
 
-/// Runs `new robot` and `check`, and compares what they print.
+/// Runs `new robot` and `check`, and compares their words.
 fn said_wrongly(expected: &Expected, folder: &Path) -> Vec<String> {
     let mut faults = Vec::new();
     let mut said = String::new();

@@ -61,7 +61,7 @@ fn a_robot_whose_fingers_are_not_found_gets_a_profile_with_a_gap() {
         ("no gripper", arm(|_| String::new()), "has a name with"),
         (
             "no shapes",
-            arm(|fingers| without(fingers, "collision")),
+            arm(|fingers| without(&without(fingers, "collision"), "visual")),
             "have no collision shapes",
         ),
         (

@@ -354,7 +354,7 @@ impl ModelLibrary {
                 files: &files,
                 folders: self.foreign_folders(),
             };
-            let included = foreign::world::Included {
+            let included = foreign::world::WorldModels {
                 models: &self.models,
                 posed: &self.posed,
                 lookup: &lookup,

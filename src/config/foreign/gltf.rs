@@ -17,7 +17,7 @@ use base64::engine::{DecodePaddingMode, GeneralPurposeConfig};
 use nalgebra::{Matrix3, Matrix4, Point3, Quaternion, UnitQuaternion, Vector3};
 
 use crate::foreign::gltf_document::{
-    Accessor, BufferView, Document, Node, Primitive, harmless_extension,
+    Accessor, BufferView, Document, GltfNode, Primitive, harmless_extension,
 };
 use crate::foreign::lookup;
 use crate::foreign::mesh_file::{MOST_TRIANGLES, MeshFileFault, checked};
@@ -88,7 +88,7 @@ pub(crate) enum GltfFault {
 }
 
 /// A mesh of a glTF file.
-pub(crate) struct Read {
+pub(crate) struct GltfMesh {
     pub(crate) mesh: Mesh,
     /// The bytes of its buffers in other files, for digests.
     pub(crate) others: Vec<u8>,
@@ -103,7 +103,7 @@ pub(crate) fn read(
     path: &Path,
     bytes: &[u8],
     warnings: &mut Diagnostics,
-) -> Result<Read, MeshFileFault> {
+) -> Result<GltfMesh, MeshFileFault> {
     let (json, binary) = parts(bytes)?;
     let document = parse(json)?;
     let mut buffers = Buffers {
@@ -114,7 +114,7 @@ pub(crate) fn read(
         total: 0,
         others: Vec::new(),
     };
-    let mut gathering = SceneTriangles {
+    let mut gathering = GltfTriangles {
         document: &document,
         known: BTreeMap::new(),
         vertices: Vec::new(),
@@ -135,7 +135,7 @@ pub(crate) fn read(
             "they have no surface, so the model works without them",
         );
     }
-    Ok(Read {
+    Ok(GltfMesh {
         mesh: checked(gathering.vertices, gathering.triangles)?,
         others: buffers.others,
     })
@@ -262,23 +262,23 @@ impl Buffers<'_> {
 }
 
 /// A mesh in its own frame. Unit: metres.
-struct Geometry {
+struct GltfGeometry {
     positions: Vec<Point3<f64>>,
     triangles: Vec<[usize; 3]>,
 }
 
 /// The scene's triangles so far. Unit: metres.
-struct SceneTriangles<'a> {
+struct GltfTriangles<'a> {
     document: &'a Document,
     /// Meshes that were read, by index: a scene may instance one thousands of times.
-    known: BTreeMap<usize, Rc<Geometry>>,
+    known: BTreeMap<usize, Rc<GltfGeometry>>,
     vertices: Vec<[f64; 3]>,
     triangles: Vec<[u32; 3]>,
     /// Whether a mesh has points or lines.
     has_lines: bool,
 }
 
-impl SceneTriangles<'_> {
+impl GltfTriangles<'_> {
     /// Gathers the default scene, or else the first, or else all nodes without a parent, or else
     /// every mesh without transforms.
     fn scene(&mut self, buffers: &mut Buffers) -> Result<(), GltfFault> {
@@ -364,13 +364,13 @@ impl SceneTriangles<'_> {
         Ok(())
     }
 
-    fn geometry(&mut self, idx: usize, buffers: &mut Buffers) -> Result<Geometry, GltfFault> {
+    fn geometry(&mut self, idx: usize, buffers: &mut Buffers) -> Result<GltfGeometry, GltfFault> {
         let document = self.document;
         let mesh = document
             .meshes
             .get(idx)
             .ok_or(GltfFault::Missing("mesh", idx))?;
-        let mut geometry = Geometry {
+        let mut geometry = GltfGeometry {
             positions: Vec::new(),
             triangles: Vec::new(),
         };
@@ -386,7 +386,7 @@ impl SceneTriangles<'_> {
 }
 
 /// Reports a node whose mesh is not where its accessors and transforms place it.
-fn check_static(document: &Document, idx: usize, node: &Node) -> Result<(), GltfFault> {
+fn check_static(document: &Document, idx: usize, node: &GltfNode) -> Result<(), GltfFault> {
     if node.skin.is_some() {
         return Err(GltfFault::Node(idx, "a surface moved by a skeleton"));
     }
@@ -409,7 +409,7 @@ fn check_static(document: &Document, idx: usize, node: &Node) -> Result<(), Gltf
 }
 
 /// Returns the transform of a node from its parent's frame.
-fn transform(idx: usize, node: &Node) -> Result<Matrix4<f64>, GltfFault> {
+fn transform(idx: usize, node: &GltfNode) -> Result<Matrix4<f64>, GltfFault> {
     if let Some(columns) = &node.matrix {
         return Ok(Matrix4::from_column_slice(columns));
     }
@@ -428,7 +428,7 @@ fn read_primitive(
     document: &Document,
     primitive: &Primitive,
     buffers: &mut Buffers,
-    geometry: &mut Geometry,
+    geometry: &mut GltfGeometry,
 ) -> Result<(), GltfFault> {
     let is_compressed = primitive.extensions.draco.is_some();
     let Some(positions) = primitive.attributes.position else {
@@ -546,7 +546,7 @@ fn read_numbers(
     }
     let mut numbers = match accessor.buffer_view {
         Some(view) => {
-            let elements = Elements {
+            let elements = AccessorElements {
                 accessor: idx,
                 view: view as usize,
                 offset: accessor.byte_offset as usize,
@@ -565,7 +565,7 @@ fn read_numbers(
     if n_changes > count {
         return Err(GltfFault::Beyond(idx));
     }
-    let places = Elements {
+    let places = AccessorElements {
         accessor: idx,
         view: sparse.indices.buffer_view as usize,
         offset: sparse.indices.byte_offset as usize,
@@ -575,7 +575,7 @@ fn read_numbers(
             .ok_or(GltfFault::Type(idx))?,
         n_components: 1,
     };
-    let values = Elements {
+    let values = AccessorElements {
         view: sparse.values.buffer_view as usize,
         offset: sparse.values.byte_offset as usize,
         component,
@@ -647,7 +647,7 @@ impl Component {
 
 /// Numbers in a view of a buffer.
 #[derive(Clone, Copy)]
-struct Elements {
+struct AccessorElements {
     /// The accessor to which they belong.
     accessor: usize,
     view: usize,
@@ -658,7 +658,7 @@ struct Elements {
     n_components: usize,
 }
 
-impl Elements {
+impl AccessorElements {
     fn read(&self, document: &Document, buffers: &mut Buffers) -> Result<Vec<f64>, GltfFault> {
         let view = document
             .buffer_views

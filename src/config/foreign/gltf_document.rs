@@ -40,7 +40,7 @@ pub(super) struct Document {
     #[serde(default, deserialize_with = "few")]
     pub(super) scenes: Vec<Scene>,
     #[serde(default, deserialize_with = "few")]
-    pub(super) nodes: Vec<Node>,
+    pub(super) nodes: Vec<GltfNode>,
     #[serde(default, deserialize_with = "few")]
     pub(super) meshes: Vec<Mesh>,
     #[serde(default, deserialize_with = "few")]
@@ -65,7 +65,7 @@ pub(super) struct Scene {
 }
 
 #[derive(Deserialize)]
-pub(super) struct Node {
+pub(super) struct GltfNode {
     #[serde(default, deserialize_with = "few")]
     pub(super) children: Vec<u32>,
     pub(super) mesh: Option<u32>,
@@ -98,7 +98,7 @@ pub(super) struct Mesh {
 
 #[derive(Deserialize)]
 pub(super) struct Primitive {
-    pub(super) attributes: Attributes,
+    pub(super) attributes: VertexAttributes,
     pub(super) indices: Option<u32>,
     #[serde(default = "triangles")]
     pub(super) mode: u32,
@@ -110,7 +110,7 @@ pub(super) struct Primitive {
 }
 
 #[derive(Deserialize)]
-pub(super) struct Attributes {
+pub(super) struct VertexAttributes {
     #[serde(rename = "POSITION")]
     pub(super) position: Option<u32>,
 }

@@ -10,11 +10,11 @@ use std::rc::Rc;
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
+use crate::foreign::geom_mass::{self, GeomMass};
 use crate::foreign::lookup::{Lookup, beside};
-use crate::foreign::mjcf_compiler::{Attributes, Compiler, Item, Whole, with_includes};
+use crate::foreign::mjcf_compiler::{Compiler, Item, MjcfAttributes, Whole, with_includes};
 use crate::foreign::mjcf_couplings::{Couplings, elements};
 use crate::foreign::mjcf_masks::{Mask, collides};
-use crate::foreign::solid_mass::{self, SolidMass};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostics, Source, SourceSpan};
 use actcheck_data::{
@@ -33,13 +33,17 @@ const SLIDES_M: f64 = 10.0;
 const DEEPEST: usize = 8;
 
 /// A tree, its text with all included files, and warnings.
-pub(crate) type Read = (ModelTree, Source, Diagnostics);
+pub(crate) type MjcfRead = (ModelTree, Source, Diagnostics);
 
 /// Reads a robot.
 ///
 /// # Errors
 /// Faults of the text: W031 to W036, W051, W055.
-pub(crate) fn robot(source: &Source, path: &Path, lookup: &Lookup) -> Result<Read, Diagnostics> {
+pub(crate) fn robot(
+    source: &Source,
+    path: &Path,
+    lookup: &Lookup,
+) -> Result<MjcfRead, Diagnostics> {
     whole(source, path, lookup, Purpose::Robot, 0)
 }
 
@@ -48,7 +52,11 @@ pub(crate) fn robot(source: &Source, path: &Path, lookup: &Lookup) -> Result<Rea
 ///
 /// # Errors
 /// As [`robot`].
-pub(crate) fn object(source: &Source, path: &Path, lookup: &Lookup) -> Result<Read, Diagnostics> {
+pub(crate) fn object(
+    source: &Source,
+    path: &Path,
+    lookup: &Lookup,
+) -> Result<MjcfRead, Diagnostics> {
     whole(source, path, lookup, Purpose::Object, 0)
 }
 
@@ -65,7 +73,7 @@ fn whole(
     lookup: &Lookup,
     purpose: Purpose,
     depth: usize,
-) -> Result<Read, Diagnostics> {
+) -> Result<MjcfRead, Diagnostics> {
     with_model(
         source,
         path,
@@ -508,7 +516,7 @@ impl Model<'_> {
     fn joint(
         &mut self,
         item: &Item<'_>,
-        attributes: &Attributes<'_>,
+        attributes: &MjcfAttributes<'_>,
         [parent, child]: [&str; 2],
         origin: Isometry3<f64>,
         reader: &mut Reader,
@@ -590,7 +598,7 @@ impl Model<'_> {
     fn range(
         &self,
         joint: Node,
-        attributes: &Attributes<'_>,
+        attributes: &MjcfAttributes<'_>,
         name: &str,
         slides: bool,
         reader: &mut Reader,
@@ -627,7 +635,7 @@ impl Model<'_> {
     fn effort(
         &self,
         joint: Node,
-        attributes: &Attributes<'_>,
+        attributes: &MjcfAttributes<'_>,
         name: &str,
         reader: &mut Reader,
     ) -> f64 {
@@ -666,7 +674,7 @@ impl Model<'_> {
         for link in &mut self.tree.links {
             if link.inertial.is_none() {
                 let geoms = link.solids.iter().chain(&link.visuals);
-                let SolidMass { kg, com, about_com } = solid_mass::together(geoms, &meshes);
+                let GeomMass { kg, com, about_com } = geom_mass::together(geoms, &meshes);
                 link.inertial = (kg > 0.0).then(|| TreeInertial {
                     pose: Isometry3::translation(com.x, com.y, com.z),
                     kg,

@@ -132,12 +132,12 @@ impl MassRules {
 }
 
 /// The attributes of an element, with the defaults of its class.
-pub(super) struct Attributes<'a> {
+pub(super) struct MjcfAttributes<'a> {
     node: Node<'a>,
     defaults: Option<&'a Values>,
 }
 
-impl<'a> Attributes<'a> {
+impl<'a> MjcfAttributes<'a> {
     /// Returns an attribute.
     pub(super) fn get(&self, name: &str) -> Option<&'a str> {
         self.node
@@ -395,10 +395,14 @@ impl Compiler {
     }
 
     /// Returns the attributes of an element in a body of this class.
-    pub(super) fn attributes<'a>(&'a self, node: Node<'a>, class: Option<&str>) -> Attributes<'a> {
+    pub(super) fn attributes<'a>(
+        &'a self,
+        node: Node<'a>,
+        class: Option<&str>,
+    ) -> MjcfAttributes<'a> {
         let class = node.attribute("class").or(class).unwrap_or(MAIN);
         let defaults = self.defaults.get(class).or_else(|| self.defaults.get(MAIN));
-        Attributes {
+        MjcfAttributes {
             node,
             defaults: defaults.and_then(|elements| elements.get(kind(node.tag_name().name()))),
         }
@@ -496,7 +500,7 @@ impl Compiler {
     /// Returns the pose of an element; the identity after it has reported a fault.
     pub(super) fn pose(
         &self,
-        attributes: &Attributes<'_>,
+        attributes: &MjcfAttributes<'_>,
         node: Node,
         reader: &mut Reader,
     ) -> Isometry3<f64> {
@@ -512,7 +516,7 @@ impl Compiler {
 
     fn rotation(
         &self,
-        attributes: &Attributes<'_>,
+        attributes: &MjcfAttributes<'_>,
         node: Node,
         reader: &mut Reader,
     ) -> Option<UnitQuaternion<f64>> {

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::foreign::mjcf_compiler::{Attributes, Compiler};
+use crate::foreign::mjcf_compiler::{Compiler, MjcfAttributes};
 use crate::foreign::mjcf_loops::{self, BodyTree};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 
@@ -211,7 +211,7 @@ impl Couplings {
 /// if it is unlimited.
 fn force_range(
     actuator: Node,
-    attributes: &Attributes<'_>,
+    attributes: &MjcfAttributes<'_>,
     reader: &mut Reader,
 ) -> Option<[f64; 2]> {
     let mut limits = |key: &str, limited: &str| {
@@ -244,7 +244,7 @@ fn force_range(
 /// other actuators.
 fn servo_range(
     actuator: Node,
-    attributes: &Attributes<'_>,
+    attributes: &MjcfAttributes<'_>,
     reader: &mut Reader,
 ) -> Option<[f64; 2]> {
     let first = |name: &str, place: usize| {

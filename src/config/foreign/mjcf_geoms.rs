@@ -5,12 +5,12 @@ use std::rc::Rc;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
+use crate::foreign::geom_mass::equivalent_box;
 use crate::foreign::geometry::Shapes;
 use crate::foreign::hull::convex_hull;
 use crate::foreign::mjcf::Model;
-use crate::foreign::mjcf_compiler::{Attributes, Item, MeshAsset};
+use crate::foreign::mjcf_compiler::{Item, MeshAsset, MjcfAttributes};
 use crate::foreign::mjcf_masks::collides;
-use crate::foreign::solid_mass::equivalent_box;
 use crate::foreign::xml::{Bound, Node, Reader};
 use actcheck_data::{Matter, Mesh, Shape, TreeGeometry, TreeSolid};
 
@@ -49,7 +49,7 @@ impl<'a> Model<'a> {
     fn geom(
         &mut self,
         item: &Item<'_>,
-        attributes: &Attributes<'_>,
+        attributes: &MjcfAttributes<'_>,
         own: &Isometry3<f64>,
         reader: &mut Reader,
     ) -> Option<TreeSolid> {
@@ -98,7 +98,7 @@ impl<'a> Model<'a> {
     fn matter(
         &self,
         geom: Node,
-        attributes: &Attributes<'_>,
+        attributes: &MjcfAttributes<'_>,
         reader: &mut Reader,
     ) -> Option<Matter> {
         let [first, last] = self.compiler.masses.groups;
@@ -207,7 +207,7 @@ impl<'a> Model<'a> {
         &self,
         kind: &str,
         geom: Node,
-        attributes: &Attributes<'_>,
+        attributes: &MjcfAttributes<'_>,
         reader: &mut Reader,
     ) -> Option<Placed> {
         let name = attributes.get("mesh").unwrap_or_default();
@@ -254,7 +254,7 @@ impl<'a> Model<'a> {
 fn primitive(
     kind: &str,
     geom: Node,
-    attributes: &Attributes<'_>,
+    attributes: &MjcfAttributes<'_>,
     reader: &mut Reader,
 ) -> Option<Placed> {
     let size: Vec<f64> = attributes

@@ -1,9 +1,9 @@
 //! Masks of collisions of geoms in MJCF.
 
-use crate::foreign::mjcf_compiler::{Attributes, Compiler};
+use crate::foreign::mjcf_compiler::{Compiler, MjcfAttributes};
 
 /// Whether a geom can touch others.
-pub(super) fn collides(attributes: &Attributes<'_>, compiler: &Compiler) -> bool {
+pub(super) fn collides(attributes: &MjcfAttributes<'_>, compiler: &Compiler) -> bool {
     let is_solid =
         attributes.get("contype") != Some("0") || attributes.get("conaffinity") != Some("0");
     is_solid
@@ -20,7 +20,7 @@ pub(super) struct Mask {
 }
 
 impl Mask {
-    pub(super) fn of(attributes: &Attributes<'_>) -> Self {
+    pub(super) fn of(attributes: &MjcfAttributes<'_>) -> Self {
         let bits = |name: &str| {
             attributes
                 .get(name)

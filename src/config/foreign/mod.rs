@@ -32,6 +32,7 @@ pub(crate) mod robot;
 pub(crate) mod robot_inertia;
 pub(crate) mod robot_shapes;
 
+mod geom_mass;
 mod sdf;
 mod sdf_inertial;
 mod sdf_joint;
@@ -46,7 +47,6 @@ mod sdf_robot_model;
 mod sdf_robot_tests;
 mod sdf_robot_tree;
 mod sdf_surface;
-mod solid_mass;
 mod solids;
 #[cfg(test)]
 mod stated_tests;

@@ -18,7 +18,7 @@ pub(super) const INERTIAL: Children = Children {
 };
 
 /// A collision of a link: its element, shape and pose.
-pub(crate) struct Solid<'a> {
+pub(crate) struct CollisionSolid<'a> {
     pub(crate) collision: Node<'a>,
     pub(crate) shape: Shape,
     pub(crate) at: Isometry3<f64>,
@@ -29,7 +29,7 @@ pub(crate) struct Solid<'a> {
 pub(crate) fn read(
     link: Node,
     at: &Isometry3<f64>,
-    solids: &[Solid],
+    solids: &[CollisionSolid],
     reader: &mut Reader,
 ) -> Option<Mass> {
     let inertial = xml::child(link, "inertial");
@@ -55,7 +55,7 @@ pub(crate) fn read(
 
 /// Computes the moments of a link with a stated mass and centre from its solids. Returns `None` if
 /// one of them has no volume.
-fn of_solids(solids: &[Solid], kg: f64) -> Option<Matrix3<f64>> {
+fn of_solids(solids: &[CollisionSolid], kg: f64) -> Option<Matrix3<f64>> {
     let masses = solids
         .iter()
         .map(|solid| Some(SolidMass::of(&solid.shape)?.placed(&solid.at, 1.0)))
@@ -124,7 +124,11 @@ pub(crate) fn possible(
 
 /// Computes mass, centre and moments of a link from the volumes and densities of its collisions. A
 /// stated mass scales them, as in libsdformat.
-pub(super) fn computed(inertial: Node, solids: &[Solid], reader: &mut Reader) -> Option<Mass> {
+pub(super) fn computed(
+    inertial: Node,
+    solids: &[CollisionSolid],
+    reader: &mut Reader,
+) -> Option<Mass> {
     let usual = match xml::child(inertial, "density") {
         Some(density) => reader.number(density, Bound::Positive)?,
         None => DENSITY,
@@ -165,7 +169,7 @@ pub(super) fn computed(inertial: Node, solids: &[Solid], reader: &mut Reader) ->
 }
 
 /// Returns the exact solid of a collision; those that are simulated as meshes have less volume.
-fn of_geometry(solid: &Solid, reader: &mut Reader) -> Option<SolidMass> {
+fn of_geometry(solid: &CollisionSolid, reader: &mut Reader) -> Option<SolidMass> {
     let geometry = xml::child(solid.collision, "geometry")?;
     let parameter = |kind: Node, name: &str, reader: &mut Reader| {
         reader.number(xml::child(kind, name)?, Bound::Length)

@@ -5,7 +5,7 @@ use nalgebra::{Isometry3, Translation3};
 use crate::foreign::body::{Body, Role};
 use crate::foreign::elements::Children;
 use crate::foreign::geometry::{Shapes, check_volume};
-use crate::foreign::sdf_inertial::{self, Solid};
+use crate::foreign::sdf_inertial::{self, CollisionSolid};
 use crate::foreign::sdf_pose::pose;
 use crate::foreign::sdf_surface::Surface;
 use crate::foreign::xml::{self, Bound, Node, Reader};
@@ -170,7 +170,7 @@ fn read_collision<'a>(
     body: &mut Body,
     shapes: &mut Shapes,
     reader: &mut Reader,
-) -> Option<Solid<'a>> {
+) -> Option<CollisionSolid<'a>> {
     COLLISION.check(collision, reader);
     let at = pose(collision, reader);
     let (at, shape) = match plane(collision).filter(|_| fixed) {
@@ -188,7 +188,7 @@ fn read_collision<'a>(
     Surface::of(collision, role, reader).add_to(body, collision, role, reader);
     let (at, shape) = (at?, shape?);
     check_volume(&shape, collision, reader);
-    Some(Solid {
+    Some(CollisionSolid {
         collision,
         shape,
         at: link * at,

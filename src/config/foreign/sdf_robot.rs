@@ -11,8 +11,8 @@ use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::sdf::check_version;
 use crate::foreign::sdf_pose::{self, pose};
-use crate::foreign::sdf_robot_include::{File, Submodels};
-use crate::foreign::sdf_robot_model::{Elements, Group};
+use crate::foreign::sdf_robot_include::{SdfFile, Submodels};
+use crate::foreign::sdf_robot_model::{Group, RobotElements};
 use crate::foreign::sdf_robot_tree;
 use crate::foreign::world::ALWAYS_THERE;
 use crate::foreign::xml::{self, Node, Reader};
@@ -47,7 +47,7 @@ pub(crate) fn read(
     let document = xml::parse_model(source, &text)?;
     let mut reader = Reader::new(source);
     let opened = Cell::new(0);
-    let file = File {
+    let file = SdfFile {
         lookup,
         path,
         depth: 0,
@@ -78,7 +78,7 @@ struct Candidate<'a> {
 
 impl<'a> Candidate<'a> {
     /// Reads the models that a model includes, or that an `<include>` names.
-    fn new(node: Node<'a>, file: &File, reader: &mut Reader) -> Self {
+    fn new(node: Node<'a>, file: &SdfFile, reader: &mut Reader) -> Self {
         let (models, found) = reader.aside(|reader| {
             let mut models = Submodels::default();
             models.read(node, file, reader);
@@ -99,7 +99,7 @@ impl<'a> Candidate<'a> {
 }
 
 /// Reads the robot of a document, with its name.
-fn robot(root: Node, file: &File, reader: &mut Reader) -> Option<(String, Group)> {
+fn robot(root: Node, file: &SdfFile, reader: &mut Reader) -> Option<(String, Group)> {
     check_version(root, reader)?;
     let mut worlds = xml::children(root, "world");
     let world = worlds.next();
@@ -137,7 +137,7 @@ fn robot(root: Node, file: &File, reader: &mut Reader) -> Option<(String, Group)
         Some(_) => pose(base, reader).unwrap_or_default().inverse(),
         None => Isometry3::identity(),
     };
-    let mut elements = Elements::default();
+    let mut elements = RobotElements::default();
     for idx in &chosen {
         let candidate = &mut candidates[*idx];
         reader.found.extend(std::mem::take(&mut candidate.found));

@@ -13,7 +13,7 @@ use crate::foreign::lookup::Lookup;
 use crate::foreign::nested::{DEEPEST, check_include, refuse_static, register};
 use crate::foreign::sdf::{is_static, root_model};
 use crate::foreign::sdf_pose;
-use crate::foreign::sdf_robot_model::{Elements, End, Group, JointAt, LinkAt};
+use crate::foreign::sdf_robot_model::{Group, JointAt, JointEnd, LinkAt, RobotElements};
 use crate::foreign::xml::{self, Node, Reader};
 use crate::foreign::{mjcf, root_name, urdf_tree};
 use actcheck_base::{Diagnostics, Source};
@@ -23,7 +23,7 @@ use actcheck_data::{ModelTree, TreeGeometry, TreeJoint};
 const MOST_FILES: usize = 200;
 
 /// A file of a robot.
-pub(crate) struct File<'a> {
+pub(crate) struct SdfFile<'a> {
     pub(crate) lookup: &'a Lookup<'a>,
     pub(crate) path: &'a Path,
     /// Number of models that include this one.
@@ -32,7 +32,7 @@ pub(crate) struct File<'a> {
     pub(crate) opened: &'a Cell<usize>,
 }
 
-impl File<'_> {
+impl SdfFile<'_> {
     /// Returns a mesh's URI as a path that does not depend on this file, if that is an included one.
     pub(crate) fn mesh(&self, uri: &str) -> String {
         match self.lookup.resolve(uri, self.path) {
@@ -56,7 +56,7 @@ pub(crate) struct Submodels(BTreeMap<usize, Group>);
 impl Submodels {
     /// Reads the model of an `<include>`, or all that a model includes, and makes their frames
     /// known.
-    pub(crate) fn read(&mut self, node: Node, file: &File, reader: &mut Reader) {
+    pub(crate) fn read(&mut self, node: Node, file: &SdfFile, reader: &mut Reader) {
         match node.tag_name().name() {
             "model" => node
                 .children()
@@ -85,7 +85,7 @@ impl Submodels {
 }
 
 /// Reads the model of an `<include>`. Returns `None` after it has reported a fault.
-fn include(include: Node, file: &File, reader: &mut Reader) -> Option<Group> {
+fn include(include: Node, file: &SdfFile, reader: &mut Reader) -> Option<Group> {
     check_include(include, reader);
     let uri = reader.required(include, "uri")?;
     if file.depth >= DEEPEST || file.opened.get() >= MOST_FILES {
@@ -127,7 +127,7 @@ fn include(include: Node, file: &File, reader: &mut Reader) -> Option<Group> {
 }
 
 /// Reads a model of another file.
-fn submodel(text: &ModelText, file: &File, reader: &mut Reader) -> Option<Submodel> {
+fn submodel(text: &ModelText, file: &SdfFile, reader: &mut Reader) -> Option<Submodel> {
     let mut folders: Vec<_> = text
         .path
         .parent()
@@ -139,7 +139,7 @@ fn submodel(text: &ModelText, file: &File, reader: &mut Reader) -> Option<Submod
         files: file.lookup.files,
         folders,
     };
-    let inner = File {
+    let inner = SdfFile {
         lookup: &lookup,
         path: &text.path,
         depth: file.depth + 1,
@@ -164,14 +164,14 @@ fn submodel(text: &ModelText, file: &File, reader: &mut Reader) -> Option<Submod
 
 fn sdf(
     source: &Source,
-    file: &File,
+    file: &SdfFile,
     found: &mut Diagnostics,
 ) -> Result<Option<Submodel>, Diagnostics> {
     let text = repaired(&source.text);
     let document = xml::parse_model(source, &text)?;
     let mut reader = Reader::new(source);
     let model = root_model(document.root_element(), &mut reader).and_then(|model| {
-        let mut elements = Elements::default();
+        let mut elements = RobotElements::default();
         elements.models.read(model, file, &mut reader);
         elements.add_model(model, &Isometry3::identity(), "", &mut reader);
         let (stated, placement) = sdf_pose::placement(model, &mut reader)?;
@@ -194,7 +194,7 @@ fn sdf(
 
 fn urdf(
     source: &Source,
-    file: &File,
+    file: &SdfFile,
     found: &mut Diagnostics,
 ) -> Result<Option<Submodel>, Diagnostics> {
     let document = xml::parse_model(source, &source.text)?;
@@ -205,7 +205,7 @@ fn urdf(
 }
 
 /// Returns the links and joints of a model in another format, with all joints at 0.
-fn of_tree(tree: ModelTree, file: &File) -> Option<Submodel> {
+fn of_tree(tree: ModelTree, file: &SdfFile) -> Option<Submodel> {
     let mut poses: BTreeMap<String, Isometry3<f64>> = BTreeMap::new();
     let is_child = |name: &str| tree.joints.iter().any(|joint| joint.child == name);
     let root = tree
@@ -246,7 +246,7 @@ fn of_tree(tree: ModelTree, file: &File) -> Option<Submodel> {
         },
     );
     let position = |name: &str| tree.links.iter().position(|link| link.name == name);
-    let end = |name: &str| position(name).map_or(End::World, End::Link);
+    let end = |name: &str| position(name).map_or(JointEnd::World, JointEnd::Link);
     let joints = tree.joints.iter().map(|joint| {
         let frame = at(&joint.child);
         JointAt {

@@ -7,10 +7,10 @@ use nalgebra::{Isometry3, Matrix3};
 use crate::foreign::body::Role;
 use crate::foreign::elements::{Children, refuse_switch};
 use crate::foreign::geometry::{KINDS, Shapes, cone, kind_of};
-use crate::foreign::sdf_inertial::{self, INERTIAL, Solid};
+use crate::foreign::sdf_inertial::{self, CollisionSolid, INERTIAL};
 use crate::foreign::sdf_link::{COLLISION, LINK, check_drag};
 use crate::foreign::sdf_pose::pose;
-use crate::foreign::sdf_robot_include::File;
+use crate::foreign::sdf_robot_include::SdfFile;
 use crate::foreign::sdf_robot_model::LinkAt;
 use crate::foreign::sdf_surface::Surface;
 use crate::foreign::xml::{self, Bound, Node, Reader};
@@ -28,7 +28,7 @@ const MESH: Children = Children {
 pub(crate) fn read(
     link: Node,
     name: &str,
-    file: &File,
+    file: &SdfFile,
     meshes: &mut BTreeMap<String, Mesh>,
     reader: &mut Reader,
 ) -> LinkAt {
@@ -101,7 +101,7 @@ fn check_motion(link: Node, reader: &mut Reader) {
 fn solid(
     node: Node,
     link: &str,
-    file: &File,
+    file: &SdfFile,
     meshes: &mut BTreeMap<String, Mesh>,
     reader: &mut Reader,
 ) -> Option<TreeSolid> {
@@ -146,7 +146,7 @@ fn three(kind: Node, name: &str, reader: &mut Reader) -> Option<[f64; 3]> {
     reader.numbers(node, xml::text(node), Bound::Length)
 }
 
-fn shape(kind: Node, file: &File, reader: &mut Reader) -> Option<TreeGeometry> {
+fn shape(kind: Node, file: &SdfFile, reader: &mut Reader) -> Option<TreeGeometry> {
     match kind.tag_name().name() {
         "sphere" => number(kind, "radius", reader).map(|radius| TreeGeometry::Sphere { radius }),
         "box" => three(kind, "size", reader).map(|size| TreeGeometry::Box { size }),
@@ -189,7 +189,7 @@ fn shape(kind: Node, file: &File, reader: &mut Reader) -> Option<TreeGeometry> {
 fn inertial(
     link: Node,
     solids: &[(Node, TreeSolid)],
-    file: &File,
+    file: &SdfFile,
     reader: &mut Reader,
 ) -> Option<TreeInertial> {
     let inertial = xml::child(link, "inertial");
@@ -250,7 +250,7 @@ fn stated(inertial: Node, reader: &mut Reader) -> Option<TreeInertial> {
 fn computed(
     inertial: Node,
     solids: &[(Node, TreeSolid)],
-    file: &File,
+    file: &SdfFile,
     reader: &mut Reader,
 ) -> Option<TreeInertial> {
     INERTIAL.check(inertial, reader);
@@ -262,7 +262,7 @@ fn computed(
             // The inertia of an ellipsoid follows from its element.
             (geometry, _) => geometry.solid().unwrap_or(Shape::Box { size: [1.0; 3] }),
         };
-        found.push(Solid {
+        found.push(CollisionSolid {
             collision: *collision,
             shape,
             at: solid.pose,

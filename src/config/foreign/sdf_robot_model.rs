@@ -8,7 +8,7 @@ use crate::foreign::elements::Children;
 use crate::foreign::nested::refuse_static;
 use crate::foreign::sdf::is_static;
 use crate::foreign::sdf_pose::{self, pose};
-use crate::foreign::sdf_robot_include::{File, Submodels};
+use crate::foreign::sdf_robot_include::{SdfFile, Submodels};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use crate::foreign::{sdf_robot_joint, sdf_robot_link};
 use actcheck_base::{Diagnostics, did_you_mean};
@@ -54,7 +54,7 @@ pub(crate) struct LinkAt {
 
 /// An end of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum End {
+pub(crate) enum JointEnd {
     /// A link, by its index.
     Link(usize),
     World,
@@ -65,7 +65,7 @@ pub(crate) struct JointAt {
     /// Its axis is in the frame of the outermost model.
     pub(crate) joint: TreeJoint,
     /// Parent and child.
-    pub(crate) ends: [End; 2],
+    pub(crate) ends: [JointEnd; 2],
     /// The frame of the joint. Frame: that of the outermost model.
     pub(crate) frame: Isometry3<f64>,
 }
@@ -104,8 +104,8 @@ impl Group {
                 JointAt {
                     joint: moved.joint,
                     ends: moved.ends.map(|end| match end {
-                        End::Link(idx) => End::Link(idx + first),
-                        End::World => End::World,
+                        JointEnd::Link(idx) => JointEnd::Link(idx + first),
+                        JointEnd::World => JointEnd::World,
                     }),
                     frame: at * moved.frame,
                 }
@@ -161,7 +161,7 @@ impl Group {
 }
 
 /// An element of a model, before it is read.
-struct Written<'a> {
+struct WrittenPart<'a> {
     node: Node<'a>,
     /// Pose of its model in the outermost one.
     model: Isometry3<f64>,
@@ -173,16 +173,16 @@ struct Written<'a> {
 
 /// The elements of a model and of the models nested in it, and the models that they include.
 #[derive(Default)]
-pub(crate) struct Elements<'a> {
-    links: Vec<Written<'a>>,
-    joints: Vec<Written<'a>>,
-    includes: Vec<Written<'a>>,
+pub(crate) struct RobotElements<'a> {
+    links: Vec<WrittenPart<'a>>,
+    joints: Vec<WrittenPart<'a>>,
+    includes: Vec<WrittenPart<'a>>,
     /// Plugins by which a joint follows another.
-    couplings: Vec<Written<'a>>,
+    couplings: Vec<WrittenPart<'a>>,
     pub(crate) models: Submodels,
 }
 
-impl<'a> Elements<'a> {
+impl<'a> RobotElements<'a> {
     /// Adds a `<model>` or an `<include>`. `places`: its own pose counts, and its names have a
     /// beginning.
     pub(crate) fn add(
@@ -193,7 +193,7 @@ impl<'a> Elements<'a> {
         reader: &mut Reader,
     ) {
         if node.tag_name().name() == "include" {
-            self.includes.push(Written {
+            self.includes.push(WrittenPart {
                 node,
                 model: *at,
                 prefix: String::new(),
@@ -229,7 +229,7 @@ impl<'a> Elements<'a> {
         MODEL.check(model, reader);
         let collides = xml::child(model, "self_collide").and_then(|node| reader.boolean(node));
         for child in model.children().filter(Node::is_element) {
-            let written = |node| Written {
+            let written = |node| WrittenPart {
                 node,
                 model: *at,
                 prefix: prefix.to_owned(),
@@ -263,7 +263,7 @@ impl<'a> Elements<'a> {
 
     /// Adds joints of the world that contains the robot.
     pub(crate) fn add_joints(&mut self, joints: &[Node<'a>], to_robot: &Isometry3<f64>) {
-        self.joints.extend(joints.iter().map(|node| Written {
+        self.joints.extend(joints.iter().map(|node| WrittenPart {
             node: *node,
             model: *to_robot,
             prefix: String::new(),
@@ -272,7 +272,7 @@ impl<'a> Elements<'a> {
     }
 
     /// Reads all elements.
-    pub(crate) fn into_group(mut self, file: &File, reader: &mut Reader) -> Group {
+    pub(crate) fn into_group(mut self, file: &SdfFile, reader: &mut Reader) -> Group {
         let mut group = Group::default();
         for link in &self.links {
             read_link(link, &mut group, file, reader);
@@ -303,7 +303,7 @@ impl<'a> Elements<'a> {
     }
 }
 
-fn read_link(link: &Written, group: &mut Group, file: &File, reader: &mut Reader) {
+fn read_link(link: &WrittenPart, group: &mut Group, file: &SdfFile, reader: &mut Reader) {
     let at = link.model * pose(link.node, reader).unwrap_or_default();
     let Some(name) = reader.attribute(link.node, "name") else {
         return;
@@ -323,7 +323,7 @@ fn read_link(link: &Written, group: &mut Group, file: &File, reader: &mut Reader
 
 /// Reads a joint. Returns `None` if it does not connect links, after it has reported the fault. One
 /// with another fault is of an unknown kind.
-fn read_joint(joint: &Written, group: &Group, reader: &mut Reader) -> Option<JointAt> {
+fn read_joint(joint: &WrittenPart, group: &Group, reader: &mut Reader) -> Option<JointAt> {
     let node = joint.node;
     let own_name = reader.attribute(node, "name")?;
     let name = format!("{}{own_name}", joint.prefix);
@@ -356,12 +356,12 @@ fn read_joint(joint: &Written, group: &Group, reader: &mut Reader) -> Option<Joi
 
 /// Returns the frame in which the pose of a joint is: that of its child, in the outermost model.
 fn frame_of_child(
-    joint: &Written,
-    child: End,
+    joint: &WrittenPart,
+    child: JointEnd,
     group: &Group,
     reader: &mut Reader,
 ) -> Option<Isometry3<f64>> {
-    let End::Link(link) = child else {
+    let JointEnd::Link(link) = child else {
         return Some(joint.model);
     };
     let named = xml::text(xml::child(joint.node, "child")?);
@@ -375,7 +375,7 @@ fn frame_of_child(
 
 /// Returns the link that an end of a joint names, itself or by a frame. Reports W051, and returns
 /// `None`, if there is no such link.
-fn end(joint: &Written, which: &str, group: &Group, reader: &mut Reader) -> Option<End> {
+fn end(joint: &WrittenPart, which: &str, group: &Group, reader: &mut Reader) -> Option<JointEnd> {
     let element = reader.required(joint.node, which)?;
     let named = xml::text(element);
     let links = || group.links.iter().map(|link| link.link.name.as_str());
@@ -383,10 +383,10 @@ fn end(joint: &Written, which: &str, group: &Group, reader: &mut Reader) -> Opti
     let carried = sdf_pose::carrier(joint.node, named, reader)
         .and_then(|link| position(&format!("{}{link}", joint.prefix)));
     if let Some(idx) = carried {
-        return Some(End::Link(idx));
+        return Some(JointEnd::Link(idx));
     }
     if named == "world" {
-        return Some(End::World);
+        return Some(JointEnd::World);
     }
     // Early versions name links without, or with other, names of models.
     let last = |name: &str| name.rsplit("::").next().unwrap_or(name).to_owned();
@@ -394,7 +394,7 @@ fn end(joint: &Written, which: &str, group: &Group, reader: &mut Reader) -> Opti
         .enumerate()
         .filter(|(_, link)| last(link) == last(named));
     if let (Some((idx, _)), None) = (alike.next(), alike.next()) {
-        return Some(End::Link(idx));
+        return Some(JointEnd::Link(idx));
     }
     let help = did_you_mean(named, links());
     reader.error("W051", element, format!("there is no link `{named}`"), help);
@@ -402,7 +402,7 @@ fn end(joint: &Written, which: &str, group: &Group, reader: &mut Reader) -> Opti
 }
 
 /// Gives a joint the coupling of a plugin.
-fn couple(plugin: &Written, group: &mut Group, reader: &mut Reader) {
+fn couple(plugin: &WrittenPart, group: &mut Group, reader: &mut Reader) {
     let node = plugin.node;
     let named = |which: &str| {
         let name = xml::child(node, which).map_or("", xml::text);

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use nalgebra::Isometry3;
 
-use crate::foreign::sdf_robot_model::{End, Group, JointAt, LinkAt};
+use crate::foreign::sdf_robot_model::{Group, JointAt, JointEnd, LinkAt};
 use crate::foreign::xml::{self, Reader};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_data::{ModelTree, TreeJoint, TreeLink, TreeMotion};
@@ -105,7 +105,7 @@ fn warn_of_missing_masses(links: &[LinkAt], reader: &mut Reader) {
 /// Returns the root: the only link that is fixed to the world, or else a link for the frame of the
 /// model, which is added if no other is there.
 fn add_root(group: &mut Group, reader: &mut Reader) -> usize {
-    let is_to_world = |joint: &JointAt| joint.ends.contains(&End::World);
+    let is_to_world = |joint: &JointAt| joint.ends.contains(&JointEnd::World);
     let to_world: Vec<&JointAt> = group
         .joints
         .iter()
@@ -115,8 +115,8 @@ fn add_root(group: &mut Group, reader: &mut Reader) -> usize {
         [] => Some(widest(group)),
         [only] if only.joint.motion == TreeMotion::Fixed => {
             only.ends.iter().find_map(|end| match end {
-                End::Link(idx) => Some(*idx),
-                End::World => None,
+                JointEnd::Link(idx) => Some(*idx),
+                JointEnd::World => None,
             })
         }
         _ => None,
@@ -151,13 +151,13 @@ fn add_root(group: &mut Group, reader: &mut Reader) -> usize {
         let joint = TreeJoint::fixed(joint_name, ["", ""], at, place.clone());
         group.joints.push(JointAt {
             joint,
-            ends: [End::Link(added), End::Link(root)],
+            ends: [JointEnd::Link(added), JointEnd::Link(root)],
             frame: at,
         });
     }
     for end in group.joints.iter_mut().flat_map(|joint| &mut joint.ends) {
-        if *end == End::World {
-            *end = End::Link(added);
+        if *end == JointEnd::World {
+            *end = JointEnd::Link(added);
         }
     }
     group.links.push(LinkAt {
@@ -177,7 +177,7 @@ fn widest(group: &Group) -> usize {
     let mut below = vec![Vec::new(); n_links];
     let mut is_child = vec![false; n_links];
     for joint in &group.joints {
-        if let [End::Link(parent), End::Link(child)] = joint.ends {
+        if let [JointEnd::Link(parent), JointEnd::Link(child)] = joint.ends {
             below[parent].push(child);
             is_child[child] = true;
         }
@@ -206,7 +206,7 @@ type Above = Option<(usize, usize)>;
 fn spread(group: &Group, root: usize) -> (Vec<Above>, Vec<usize>) {
     let mut near = vec![Vec::new(); group.links.len()];
     for (idx, joint) in group.joints.iter().enumerate() {
-        if let [End::Link(parent), End::Link(child)] = joint.ends {
+        if let [JointEnd::Link(parent), JointEnd::Link(child)] = joint.ends {
             near[parent].push((idx, child));
             near[child].push((idx, parent));
         }
@@ -227,7 +227,7 @@ fn spread(group: &Group, root: usize) -> (Vec<Above>, Vec<usize>) {
         }
     }
     let closes = |idx: &usize| match group.joints[*idx].ends {
-        [End::Link(parent), _] => is_reached[parent] && !is_used[*idx],
+        [JointEnd::Link(parent), _] => is_reached[parent] && !is_used[*idx],
         _ => false,
     };
     let closing = (0..group.joints.len()).filter(closes).collect();
@@ -266,7 +266,7 @@ fn placed(
     frames: &[Isometry3<f64>],
 ) -> TreeJoint {
     let axis = frames[child].rotation.inverse() * joint.joint.axis;
-    let is_turned = joint.ends == [End::Link(child), End::Link(parent)];
+    let is_turned = joint.ends == [JointEnd::Link(child), JointEnd::Link(parent)];
     let name = |link: usize| links[link].link.name.clone();
     TreeJoint {
         parent: name(parent),

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use nalgebra::Point3;
 
 use crate::foreign::folder::Read;
-use crate::foreign::world::{self, Included};
+use crate::foreign::world::{self, WorldModels};
 use crate::foreign::{Lookup, find, read};
 use actcheck_base::{Files, Source};
 use actcheck_data::{ObjectModel, Part, Pose, bounds};
@@ -83,7 +83,7 @@ fn furniture(files: &[(&str, &str)], inside: &str) -> Result<(Vec<String>, Strin
         .iter()
         .filter(|(_, read)| read.has_pose)
         .map(|(name, _)| name.clone());
-    let included = Included {
+    let included = WorldModels {
         posed: &posed.collect(),
         models: &read
             .into_iter()

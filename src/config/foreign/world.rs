@@ -66,7 +66,7 @@ pub(crate) struct World {
 }
 
 /// The models that worlds can include.
-pub(crate) struct Included<'a> {
+pub(crate) struct WorldModels<'a> {
     /// Usable models by name.
     pub(crate) models: &'a BTreeMap<String, Arc<ObjectModel>>,
     /// Names of models whose files give them a pose, which that of an `<include>` replaces.
@@ -92,7 +92,7 @@ pub(crate) fn read(
     name: &str,
     source: &Source,
     path: &Path,
-    included: &Included<'_>,
+    included: &WorldModels<'_>,
 ) -> (Option<World>, Diagnostics) {
     let text = repaired(&source.text);
     let document = match xml::parse_model(source, &text) {
@@ -134,7 +134,7 @@ pub(crate) fn read(
 /// A world while it is read.
 struct WorldReader<'a> {
     path: &'a Path,
-    included: &'a Included<'a>,
+    included: &'a WorldModels<'a>,
     world: World,
     /// All models of the world, before buildings are split and floors are left out, with their
     /// elements in the text.

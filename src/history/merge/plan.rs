@@ -177,7 +177,7 @@ enum Identity {
     Whole {
         first_id: String,
         whole: String,
-        /// The contents of its runs, if nothing else tells it apart.
+        /// The contents of its runs, if only they distinguish it.
         content: Option<String>,
     },
 }

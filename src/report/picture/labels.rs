@@ -14,7 +14,7 @@ const HIDES_PX: f64 = 40.0;
 /// Cost of a label that lies on lines or on the robot with all of its area. Unit: pixels.
 const BUSY_PX: f64 = 25.0;
 /// Largest width of a label, as a share of the panel's: others would lie across everything.
-const WIDEST: f64 = 0.45;
+const WIDEST: f64 = 0.7;
 /// Steps between the places of a label on its object, in each direction.
 const ON_IT: u32 = 8;
 /// Labels farther than this from their object get a leader line. Unit: pixels.
@@ -68,7 +68,7 @@ impl Labels {
             return;
         }
         let most = self.panel.width * WIDEST;
-        let text = font::shortened(label.text, label.size, label.bold, most);
+        let text = shortened(label, most);
         let width = font::width(&text, label.size, label.bold);
         let height = label.size * 1.15;
         let at = label.at.within(&self.panel);
@@ -174,6 +174,19 @@ fn leader(drawing: &mut Drawing, at: &Rect, place: &Rect) {
         vec![from, nearest(at, from)],
         Line::new(Paint::new(paint::INK, 0.55), 0.7),
     );
+}
+
+/// The text of a label, shortened to this width. The part after its last colon stays whole as long
+/// as it leaves room for others: it is the number or the name that the label is for.
+fn shortened(label: &Label<'_>, most: f64) -> String {
+    let whole = font::shortened(label.text, label.size, label.bold, most);
+    let Some((head, tail)) = label.text.rsplit_once(": ").filter(|_| whole != label.text) else {
+        return whole;
+    };
+    let end = format!(": {tail}");
+    let room = most - font::width(&end, label.size, label.bold);
+    let head = font::shortened(head, label.size, label.bold, room.max(0.0));
+    if head.is_empty() { whole } else { head + &end }
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use actcheck_data::{Matter, Mesh, Shape, TreeGeometry, TreeSolid};
 
 /// The mass of a body. Frame: that of the shape, or of the link.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct SolidMass {
+pub(crate) struct GeomMass {
     /// Unit: kilograms.
     pub(crate) kg: f64,
     /// Centre of mass. Unit: metres.
@@ -18,7 +18,7 @@ pub(crate) struct SolidMass {
     pub(crate) about_com: Matrix3<f64>,
 }
 
-impl SolidMass {
+impl GeomMass {
     const NONE: Self = Self {
         kg: 0.0,
         com: Vector3::new(0.0, 0.0, 0.0),
@@ -67,15 +67,15 @@ impl SolidMass {
 pub(crate) fn together<'a>(
     solids: impl IntoIterator<Item = &'a TreeSolid>,
     meshes: &BTreeMap<String, Vec<Shape>>,
-) -> SolidMass {
+) -> GeomMass {
     let masses = solids
         .into_iter()
         .filter_map(|solid| Some(of(solid, meshes)?.moved(&solid.pose)));
-    masses.fold(SolidMass::NONE, SolidMass::plus)
+    masses.fold(GeomMass::NONE, GeomMass::plus)
 }
 
 /// Returns the mass of a shape in its own frame; `None` if it has none.
-fn of(solid: &TreeSolid, meshes: &BTreeMap<String, Vec<Shape>>) -> Option<SolidMass> {
+fn of(solid: &TreeSolid, meshes: &BTreeMap<String, Vec<Shape>>) -> Option<GeomMass> {
     let matter = solid.matter?;
     let is_shell = matches!(matter, Matter::Shell(_) | Matter::ShellMass(_));
     let unit = of_unit(&solid.geometry, is_shell, meshes)?;
@@ -95,8 +95,8 @@ fn of_unit(
     geometry: &TreeGeometry,
     is_shell: bool,
     meshes: &BTreeMap<String, Vec<Shape>>,
-) -> Option<SolidMass> {
-    let centred = |kg: f64, moments: [f64; 3]| SolidMass {
+) -> Option<GeomMass> {
+    let centred = |kg: f64, moments: [f64; 3]| GeomMass {
         kg,
         com: Vector3::zeros(),
         about_com: Matrix3::from_diagonal(&Vector3::from(moments)),
@@ -107,7 +107,7 @@ fn of_unit(
                 Shape::Mesh { mesh } => Some(of_mesh(&mesh.scaled(*scale), is_shell)),
                 _ => None,
             });
-            parts.fold(SolidMass::NONE, SolidMass::plus)
+            parts.fold(GeomMass::NONE, GeomMass::plus)
         }
         TreeGeometry::Box { size } if is_shell => hollow_box(*size),
         TreeGeometry::Box { size: [x, y, z] } => {
@@ -143,7 +143,7 @@ fn of_unit(
 }
 
 /// A cylinder between two halves of a ball; a shell has no lids between them.
-fn capsule(r: f64, length: f64, is_shell: bool) -> SolidMass {
+fn capsule(r: f64, length: f64, is_shell: bool) -> GeomMass {
     // Mass, moment about z, and moment across it about the own centre of the cylinder.
     let (tube, tube_z, tube_across) = if is_shell {
         let kg = 2.0 * PI * r * length;
@@ -166,7 +166,7 @@ fn capsule(r: f64, length: f64, is_shell: bool) -> SolidMass {
     // Each half is moved away by half of the length along z.
     let balls_across = ball + balls * (half * half + 2.0 * half * centre);
     let across = tube_across + balls_across;
-    SolidMass {
+    GeomMass {
         kg: tube + balls,
         com: Vector3::zeros(),
         about_com: Matrix3::from_diagonal(&Vector3::new(across, across, tube_z + ball)),
@@ -174,8 +174,8 @@ fn capsule(r: f64, length: f64, is_shell: bool) -> SolidMass {
 }
 
 /// The six faces of a box.
-fn hollow_box(size: [f64; 3]) -> SolidMass {
-    let mut whole = SolidMass::NONE;
+fn hollow_box(size: [f64; 3]) -> GeomMass {
+    let mut whole = GeomMass::NONE;
     for axis in 0..3 {
         let [a, b] = [size[(axis + 1) % 3], size[(axis + 2) % 3]];
         let kg = a * b;
@@ -186,7 +186,7 @@ fn hollow_box(size: [f64; 3]) -> SolidMass {
         for side in [-0.5, 0.5] {
             let mut com = Vector3::zeros();
             com[axis] = side * size[axis];
-            whole = whole.plus(SolidMass {
+            whole = whole.plus(GeomMass {
                 kg,
                 com,
                 about_com: Matrix3::from_diagonal(&moments),
@@ -241,10 +241,10 @@ impl Sums {
 /// A mesh by MuJoCo's usual rule: the centre of mass follows from the pyramids to the middle of its
 /// surface, and volume and moments from those to the centre of mass. For a closed mesh, both are
 /// exact.
-fn of_mesh(mesh: &Mesh, is_shell: bool) -> SolidMass {
+fn of_mesh(mesh: &Mesh, is_shell: bool) -> GeomMass {
     let surface = Sums::from(Vector3::zeros(), mesh, true);
     if surface.amount <= 0.0 {
-        return SolidMass::NONE;
+        return GeomMass::NONE;
     }
     let middle = surface.first / surface.amount;
     let com = if is_shell {
@@ -252,12 +252,12 @@ fn of_mesh(mesh: &Mesh, is_shell: bool) -> SolidMass {
     } else {
         let solid = Sums::from(middle, mesh, false);
         if solid.amount <= 0.0 {
-            return SolidMass::NONE;
+            return GeomMass::NONE;
         }
         middle + solid.first / solid.amount
     };
     let sums = Sums::from(com, mesh, is_shell);
-    SolidMass {
+    GeomMass {
         kg: sums.amount,
         com,
         about_com: Matrix3::identity() * sums.second.trace() - sums.second,
