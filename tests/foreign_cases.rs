@@ -1,6 +1,6 @@
 //! Files of others that were once read wrongly: every folder of `tests/models/cases` is a case.
 //!
-//! A case has a configuration `c.toml`, the files that it names, and `expected.toml`: what
+//! A case has a configuration `c.toml`, the files that it names, and `expected.toml`: the texts that
 //! `new robot` and `check` must print, and the values that must be read. A new case needs no Rust.
 
 use std::collections::BTreeMap;

@@ -962,7 +962,8 @@ mod tests {
     /// not a force.
     #[test]
     fn an_actuator_has_the_kind_of_its_defaults() {
-        let bodies = "<body name=\"a\"><joint name=\"j\"/><geom type=\"sphere\" size=\"0.1\"/></body>";
+        let bodies =
+            "<body name=\"a\"><joint name=\"j\"/><geom type=\"sphere\" size=\"0.1\"/></body>";
         let effort = |defaults: &str| {
             let more = format!(
                 "<default><default class=\"c\">{defaults}</default></default>\

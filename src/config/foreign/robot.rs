@@ -32,7 +32,7 @@ impl RobotFile {
         if self.is_urdf {
             self.text.clone()
         } else {
-            Source::new(format!("{} (as URDF)", self.text.name), self.tree.to_urdf())
+            Source::new(self.text.name.to_string(), self.tree.to_urdf())
         }
     }
 }
