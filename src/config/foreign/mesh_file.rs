@@ -76,9 +76,12 @@ pub(crate) fn read(files: &Files, path: &Path) -> Result<MeshFile, Diagnostics> 
     let mesh = match ending.as_str() {
         "stl" => of_scene(mesh_loader::stl::from_slice(&as_binary(&bytes))),
         // Materials do not affect collisions, so their files are not read.
-        "obj" => of_scene(mesh_loader::obj::from_slice(&bytes, Some(path), |_| {
-            Ok(Vec::new())
-        })),
+        "obj" => {
+            let corners = corners_of_obj(&bytes);
+            of_scene(mesh_loader::obj::from_slice(&corners, Some(path), |_| {
+                Ok(Vec::new())
+            }))
+        }
         "msh" => of_msh(&bytes),
         "glb" | "gltf" => gltf::read(files, path, &bytes, &mut warnings).map(|read| {
             bytes.extend(read.others);
@@ -102,6 +105,47 @@ pub(crate) fn read(files: &Files, path: &Path) -> Result<MeshFile, Diagnostics> 
         bytes,
         warnings,
     })
+}
+
+/// Returns an OBJ file without textures and normals, which do not affect collisions: many files have
+/// them for some of their faces only. Lines keep their numbers.
+fn corners_of_obj(bytes: &[u8]) -> Vec<u8> {
+    let mut corners = Vec::with_capacity(bytes.len());
+    let mut element: &[u8] = b"";
+    let mut continues = false;
+    // Lines that a face goes on in.
+    let mut joined = 0;
+    for line in bytes.split_inclusive(|byte| *byte == b'\n') {
+        let text = line.trim_ascii_end();
+        let (text, is_continued) = match text.strip_suffix(b"\\") {
+            Some(text) => (text, true),
+            None => (text, false),
+        };
+        let words = text
+            .split(u8::is_ascii_whitespace)
+            .filter(|word| !word.is_empty());
+        if !continues {
+            element = words.clone().next().unwrap_or_default();
+        }
+        continues = is_continued;
+        match element {
+            b"vt" | b"vn" => corners.push(b'\n'),
+            b"f" => {
+                for word in words {
+                    corners.extend(word.iter().take_while(|byte| **byte != b'/'));
+                    corners.push(b' ');
+                }
+                if continues {
+                    joined += 1;
+                } else {
+                    corners.resize(corners.len() + joined + 1, b'\n');
+                    joined = 0;
+                }
+            }
+            _ => corners.extend(line),
+        }
+    }
+    corners
 }
 
 /// Returns the bytes of an STL file so that a binary one is recognised as such: many begin with
@@ -188,6 +232,26 @@ pub(crate) fn checked(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Some faces of an OBJ file have textures and normals and others have none, in one group.
+    #[test]
+    fn faces_of_an_obj_file_may_have_textures() {
+        let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvn 0 0 1\n\
+                    f 1/1/1 3/1/1 2/1/1\nf 1//1 2//1\\\n 4//1\nf 1 4 3\nf -3/-1 -2 -1//-1\n";
+        let read = |bytes: &[u8]| {
+            let scene = mesh_loader::obj::from_slice(bytes, None::<&Path>, |_| Ok(Vec::new()));
+            of_scene(scene)
+        };
+        let mesh = read(&corners_of_obj(text.as_bytes())).expect("it is a tetrahedron");
+        assert!((mesh.volume() - 1.0 / 6.0).abs() < 1e-9);
+        assert_eq!(
+            corners_of_obj(text.as_bytes())
+                .split(|byte| *byte == b'\n')
+                .count(),
+            text.split('\n').count()
+        );
+        assert!(read(&corners_of_obj(b"v 0 0 0\nf 1 2 3\n")).is_err());
+    }
 
     #[test]
     fn a_mesh_of_mujoco_is_read_and_a_cut_one_is_refused() {

@@ -664,14 +664,16 @@ impl Model<'_> {
         let mut meshes = BTreeMap::new();
         let mut shapes = self.shapes();
         let tree = &self.tree;
-        for link in tree.links.iter().filter(|link| link.inertial.is_none()) {
+        let unweighed = tree.links.iter().skip(1);
+        for link in unweighed.filter(|link| link.inertial.is_none()) {
             let geoms = link.solids.iter().chain(&link.visuals);
             for geom in geoms.filter(|geom| geom.matter.is_some()) {
                 shapes.load(geom, tree, &mut meshes, &mut reader.found);
             }
         }
         let rules = Rc::clone(&self.compiler);
-        for link in &mut self.tree.links {
+        // The first link is the world, which does not move and has no mass.
+        for link in self.tree.links.iter_mut().skip(1) {
             if link.inertial.is_none() {
                 let geoms = link.solids.iter().chain(&link.visuals);
                 let GeomMass { kg, com, about_com } = geom_mass::together(geoms, &meshes);
