@@ -1,12 +1,7 @@
 //! Files of others that were once read wrongly: every folder of `tests/models/cases` is a case.
 //!
-<<<<<<< HEAD
 //! A case has a configuration `c.toml`, the files that it names, and `expected.toml`: the
 //! words that `new robot` and `check` must print, and the values that must be read. A new case needs no Rust.
-=======
-//! A case has a configuration `c.toml`, the files that it names, and `expected.toml`: the texts that
-//! `new robot` and `check` must print, and the values that must be read. A new case needs no Rust.
->>>>>>> work-h
 
 use std::collections::BTreeMap;
 use std::path::Path;

@@ -25,21 +25,6 @@ pub(crate) struct RobotFile {
     pub(crate) urdf: Source,
     /// Proposed changes of impossible moments of inertia; only for URDF.
     pub(crate) mends: Vec<Mend>,
-<<<<<<< HEAD
-=======
-    is_urdf: bool,
-}
-
-impl RobotFile {
-    /// Returns the robot in URDF: its own text, or its tree in this form.
-    pub(crate) fn urdf(&self) -> Source {
-        if self.is_urdf {
-            self.text.clone()
-        } else {
-            Source::new(self.text.name.to_string(), self.tree.to_urdf())
-        }
-    }
->>>>>>> work-h
 }
 
 /// A tree before its shapes are read.
@@ -152,7 +137,7 @@ fn complete(mut bare: Bare, path: &Path, lookup: &Lookup, found: &mut Diagnostic
             );
             String::new()
         });
-        Source::new(format!("{} (as URDF)", bare.text.name), written)
+        Source::new(bare.text.name.to_string(), written)
     };
     RobotFile {
         urdf,
