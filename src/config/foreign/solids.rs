@@ -177,8 +177,8 @@ mod tests {
         for _ in 0..2 {
             let found = SolidMass::of(&Shape::Mesh { mesh: mesh.clone() }).expect("it is closed");
             near(found.volume, solid.volume);
-            for axis in 0..3 {
-                near(found.centre[axis], size[axis] / 2.0);
+            for (axis, side) in size.into_iter().enumerate() {
+                near(found.centre[axis], side / 2.0);
                 near(
                     found.about_centre[(axis, axis)],
                     solid.about_centre[(axis, axis)],
