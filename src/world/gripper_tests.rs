@@ -549,10 +549,7 @@ fn with_links(profile: &RobotProfile, links: &[String]) -> RobotProfile {
         .urdf
         .text
         .replace("</robot>", &format!("{}</robot>", links.concat()));
-    RobotProfile {
-        urdf: Source::new("hand.urdf", text),
-        ..profile.clone()
-    }
+    with_urdf(profile.clone(), text)
 }
 
 /// A can that was held between the lower links of both fingers was not held, because only the tips

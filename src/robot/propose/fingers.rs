@@ -539,7 +539,6 @@ mod tests {
             fingers.concat()
         );
         let profile = RobotProfile {
-            urdf: Source::new("hand.urdf", text),
             arm_joints: Vec::new(),
             finger_joints: Vec::new(),
             finger_links: [String::new(), String::new()],
@@ -547,6 +546,8 @@ mod tests {
             max_opening_m: 0.0,
             ..shipped
         };
+        let profile = actcheck_config::robot::with_urdf(profile, Source::new("hand.urdf", text))
+            .expect("it is a URDF");
         let model = RobotModel::read(&profile).expect("the hand is valid");
         find(&profile, &model, None)
             .unwrap_or_else(|_| panic!("there is a hand"))
