@@ -123,8 +123,7 @@ mod tests {
             finger("left", 0.005),
             finger("right", -0.005),
         );
-        Arc::new(RobotProfile {
-            urdf: Source::new("beam.urdf", urdf),
+        let profile = RobotProfile {
             arm_joints: vec!["hinge".to_owned()],
             home: vec![0.0],
             postures: vec![vec![0.0]],
@@ -138,7 +137,9 @@ mod tests {
             camera_link: "base".to_owned(),
             mount_height_m: 1.0,
             ..shipped
-        })
+        };
+        let urdf = Source::new("beam.urdf", urdf);
+        Arc::new(actcheck_config::robot::with_urdf(profile, urdf).expect("it is a URDF"))
     }
 
     /// Level, a beam of 2 kg and fingers of 0.1 kg leave 25 N·m − 9.81 m/s² · (2 kg · 0.25 m + 0.1 kg
