@@ -655,25 +655,26 @@ fn all_links_that_a_finger_joint_moves_belong_to_the_finger_on_their_side() {
     );
 
     // A carriage that moves with both fingers.
-    let carried = plain.urdf.text.replace(
-        "<parent link=\"palm\"/><child link=\"left_finger\"/>",
-        "<parent link=\"carriage\"/><child link=\"left_finger\"/>",
-    );
-    let carried = carried.replace(
-        "<parent link=\"palm\"/><child link=\"right_finger\"/>",
-        "<parent link=\"carriage\"/><child link=\"right_finger\"/>",
-    );
     let slides = "type=\"prismatic\"><parent link=\"palm\"/><axis xyz=\"1 0 0\"/><limit lower=\"-0.1\" upper=\"0.1\" effort=\"9\" \
                   velocity=\"1\"/><mimic joint=\"left\" multiplier=\"0.001\"/>";
-    let base = with_urdf(plain, carried);
     let carriage = with_links(
-        &base,
+        &plain,
         &[link(
             "carriage",
             "<origin xyz=\"-0.05 0.03 0\"/><geometry><box size=\"0.01 0.01 0.01\"/></geometry>",
             slides,
         )],
     );
+    let carried = ["left", "right"]
+        .iter()
+        .fold(carriage.urdf.text.to_string(), |text, side| {
+            let child = format!("<child link=\"{side}_finger\"/>");
+            text.replace(
+                &format!("<parent link=\"palm\"/>{child}"),
+                &format!("<parent link=\"carriage\"/>{child}"),
+            )
+        });
+    let carriage = with_urdf(carriage, carried);
     assert_eq!(
         links_of_fingers(&carriage),
         owned([&["left_finger"], &["right_finger"]])
