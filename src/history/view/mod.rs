@@ -4,8 +4,6 @@ mod dataset;
 mod demand;
 mod interner;
 mod orders;
-#[cfg(test)]
-mod w3c_tests;
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
@@ -460,3 +458,6 @@ fn too_many(stored: &StoredCampaigns, count: u64) -> Diagnostics {
         )
         .into()
 }
+
+#[cfg(test)]
+mod w3c_tests;

@@ -3,10 +3,14 @@
 use spargebra::algebra::Expression;
 use spargebra::{Query, SparqlParser};
 
-use actcheck_base::names;
+use actcheck_base::{names, sparql_excess};
 
-/// Parses a query with the known prefixes. Returns `None` if it is invalid.
+/// Parses a query with the known prefixes. Returns `None` if it is invalid, or so deeply nested that
+/// the parser could exhaust the stack.
 pub(super) fn parsed(text: &str) -> Option<Query> {
+    if sparql_excess(text).is_some() {
+        return None;
+    }
     let parser = names::PREFIXES
         .iter()
         .fold(SparqlParser::new(), |parser, (prefix, namespace)| {
