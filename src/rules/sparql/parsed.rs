@@ -3,12 +3,12 @@
 use spargebra::algebra::Expression;
 use spargebra::{Query, SparqlParser};
 
-use actcheck_base::{names, sparql_excess};
+use actcheck_base::{check_calls, names, sparql_excess};
 
 /// Parses a query with the known prefixes. Returns `None` if it is invalid, or so deeply nested that
 /// the parser could exhaust the stack.
 pub(super) fn parsed(text: &str) -> Option<Query> {
-    if sparql_excess(text).is_some() {
+    if sparql_excess(text).is_some() || check_calls(text).is_err() {
         return None;
     }
     let parser = names::PREFIXES
