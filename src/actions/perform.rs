@@ -9,7 +9,7 @@ use actcheck_data::{
     ActionEnd, ActionReport, ActionTrace, Budget, Choices, ContactEpisode, Extremes, Form, Frames,
     RobotCourse, SceneMap, Snapshot, Trace,
 };
-use actcheck_world::World;
+use actcheck_world::{Playback, World};
 
 /// Performs the actions in order with the reference skills.
 ///
@@ -35,6 +35,8 @@ pub struct Interference<'a> {
     pub external: Option<&'a mut dyn ExternalSkill>,
     /// Decides before each action whether it may be performed.
     pub gate: Option<&'a mut dyn Gate>,
+    /// Takes the robot's part of the run for another engine.
+    pub playback: Option<&'a mut Option<Playback>>,
 }
 
 /// Decides whether an action may be performed.
@@ -57,6 +59,9 @@ pub fn perform_with(
     mut interference: Interference<'_>,
 ) -> Trace {
     world.localise(choices);
+    if interference.playback.is_some() {
+        world.keep_playback();
+    }
     let mut snapshots = vec![world.snapshot()];
     let mut memory = Memory::default();
     let mut actions: Vec<ActionTrace> = Vec::with_capacity(calls.len());
@@ -111,6 +116,9 @@ pub fn perform_with(
         if let Err(fault) = skill.end_run(is_decided) {
             (actions[last].end, actions[last].report) = (ended_by(fault), None);
         }
+    }
+    if let Some(playback) = interference.playback {
+        *playback = world.take_playback();
     }
     let tracks = world.tracks();
     let frames = Frames {

@@ -7,6 +7,7 @@ use crate::line::{crashed, simulate};
 use crate::{Env, Failure, RunContext, RunInput};
 use actcheck_actions::{Cut, Interference};
 use actcheck_data::Choices;
+use actcheck_world::Playback;
 
 /// A run to make. Its choices can be made twice, because a crash consumes them.
 pub(super) struct Attempt<'a> {
@@ -46,6 +47,16 @@ impl Attempt<'_> {
         env: &Env,
         context: &RunContext,
     ) -> Result<FinishedRun, AttemptFault> {
+        self.make_played(env, context, None)
+    }
+
+    /// Makes the run, and takes the robot's part for another engine.
+    pub(super) fn make_played(
+        &self,
+        env: &Env,
+        context: &RunContext,
+        playback: Option<&mut Option<Playback>>,
+    ) -> Result<FinishedRun, AttemptFault> {
         let input = || RunInput {
             campaign: self.campaign,
             index: self.index,
@@ -53,6 +64,7 @@ impl Attempt<'_> {
         };
         let interference = Interference {
             cut: self.cut,
+            playback,
             ..Interference::default()
         };
         let start = context.clock.start();

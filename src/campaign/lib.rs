@@ -21,9 +21,11 @@ mod import;
 mod last_failed;
 mod line;
 mod make_run;
+mod mjcf;
 pub mod oracles;
 mod outcome;
 mod plausible;
+mod playable;
 mod preconditions;
 mod recheck;
 mod replay;
@@ -56,6 +58,7 @@ pub use import::{ImportEnd, ImportOptions, ImportedCampaign, import, name_of_imp
 pub use last_failed::LastFailed;
 pub use line::{Clock, Disturbance, RunContext, RunInput, run_line, run_sabotaged};
 pub use outcome::{CampaignResult, Ending, WeightedRate};
+pub use playable::{Playable, playable};
 pub use recheck::{RecheckEnd, RecheckOptions, judge_stored, recheck};
 pub use replay::{
     Fit, Misfit, MisfitKind, OutcomeChange, Replay, ReplayOptions, StoredCampaign, replay_all,

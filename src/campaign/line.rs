@@ -168,6 +168,7 @@ pub(super) fn simulate(
         saboteur: interference.saboteur,
         external,
         gate: None,
+        playback: interference.playback,
     };
     let (trace, quality) = perform(env, test, &scene, &mut choices, disturb, interference)?;
     if program.as_ref().is_some_and(Performance::was_stopped) {
@@ -333,6 +334,7 @@ fn perform(
         cut,
         saboteur,
         external,
+        playback,
         ..
     } = interference;
     let external = external.map(|skill| skill as &mut dyn ExternalSkill);
@@ -341,6 +343,7 @@ fn perform(
         saboteur,
         external,
         gate: Some(&mut preconditions),
+        playback,
     };
     let trace = actions::perform_with(
         &calls,

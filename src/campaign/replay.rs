@@ -215,7 +215,7 @@ pub(super) fn cut_secs(trace: &Trace) -> Option<f64> {
         .map(|last| last.time_secs)
 }
 
-fn refused(detail: &RunDetail, why: &str) -> Diagnostic {
+pub(super) fn refused(detail: &RunDetail, why: &str) -> Diagnostic {
     Diagnostic::error(
         "S041",
         format!("run {} can't be run again: {why}", detail.row.run),

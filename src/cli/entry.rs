@@ -1,5 +1,6 @@
 //! From arguments to an exit code.
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::FromArgMatches as _;
@@ -11,6 +12,27 @@ use crate::{
 };
 use actcheck_base::set_program_digest;
 
+/// Options of `export run` that name what is written: `export RUN --mjcf DIR` is short for
+/// `export run RUN --mjcf DIR`.
+const WRITES_A_RUN: [&str; 2] = ["--mjcf", "--setpoints"];
+
+/// Adds the kind `run` to an export of a run that does without it.
+fn with_kind_of_export(mut words: Vec<OsString>) -> Vec<OsString> {
+    let is_export = words.get(1).is_some_and(|word| word == "export");
+    let names_none = words
+        .get(2)
+        .is_some_and(|word| ["run", "tables", "rdf", "store", "help"].iter().all(|kind| word != kind));
+    let writes = |word: &OsString| {
+        let name = word.to_string_lossy();
+        let name = name.split_once('=').map_or(&*name, |(name, _)| name);
+        WRITES_A_RUN.contains(&name)
+    };
+    if is_export && names_none && words.iter().any(writes) {
+        words.insert(2, OsString::from("run"));
+    }
+    words
+}
+
 /// Parses the process's arguments and runs the command.
 ///
 /// Exit codes: 0 done (for `run` and `recheck`: nothing failed), 1 a property failed or a traced
@@ -19,7 +41,7 @@ pub fn run(sources_digest: &'static str) -> ExitCode {
     set_program_digest(sources_digest);
     // clap prints help, version and usage errors itself; after a usage error it exits with 2.
     let matches = groups::program()
-        .try_get_matches()
+        .try_get_matches_from(with_kind_of_export(std::env::args_os().collect()))
         .unwrap_or_else(|error| groups::with_suggestion(error).exit());
     let arguments = Arguments::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
     let done = match arguments.command {
@@ -55,6 +77,25 @@ pub fn run(sources_digest: &'static str) -> ExitCode {
         Err(faults) => {
             output::print_diagnostics(&faults);
             ExitCode::from(2)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_is_exported_without_the_kind() {
+        let words = |text: &str| text.split(' ').map(OsString::from).collect::<Vec<_>>();
+        for (given, read) in [
+            ("actcheck export k7f3-3 --mjcf d", "actcheck export run k7f3-3 --mjcf d"),
+            ("actcheck export --mjcf=d k7f3-3", "actcheck export run --mjcf=d k7f3-3"),
+            ("actcheck export run k7f3-3 --mjcf d", "actcheck export run k7f3-3 --mjcf d"),
+            ("actcheck export tabels d", "actcheck export tabels d"),
+            ("actcheck show k7f3-3 --mjcf d", "actcheck show k7f3-3 --mjcf d"),
+        ] {
+            assert_eq!(with_kind_of_export(words(given)), words(read), "{given}");
         }
     }
 }

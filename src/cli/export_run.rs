@@ -6,14 +6,16 @@ use clap::{ArgGroup, Args};
 
 use crate::options::HistoryArgs;
 use crate::trust::TrustArgs;
-use crate::{history_dir, output, output_file, trust};
+use crate::work::quietly;
+use crate::{clock, history_dir, output, output_file, trust};
 use actcheck_base::{Diagnostic, Diagnostics, ShellLine};
 use actcheck_campaign as campaign;
-use actcheck_campaign::Env;
+use actcheck_campaign::{Env, RunContext, StoredCampaign};
+use actcheck_history::{History, RunDetail};
 
 /// `actcheck export run`
 #[derive(Debug, Args)]
-#[command(group(ArgGroup::new("written").args(["output", "regression"]).required(true)))]
+#[command(group(ArgGroup::new("written").args(["output", "regression", "mjcf"]).required(true)))]
 pub struct ExportRunArgs {
     /// Id of the run, or a unique prefix
     pub run: String,
@@ -24,6 +26,13 @@ pub struct ExportRunArgs {
     /// these files first
     #[arg(long)]
     pub regression: bool,
+    /// Write the run as a model for MuJoCo into this new folder: `scene.xml`, in the state of the
+    /// first frame
+    #[arg(long, value_name = "DIR")]
+    pub mjcf: Option<PathBuf>,
+    /// With the robot's setpoints, 60 per second: `setpoints.csv`
+    #[arg(long, requires = "mjcf")]
+    pub setpoints: bool,
     /// Take everything but the choices from this configuration instead of the one in the history
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
@@ -46,6 +55,12 @@ pub fn run(args: &ExportRunArgs) -> Result<(), Diagnostics> {
         )?;
     }
     let recalled = Env::from_history(&history, &run.row.campaign, args.config.as_deref())?;
+    if let Some(folder) = &args.mjcf {
+        if args.config.is_none() && !args.trust.trust {
+            trust::check_stored(&recalled.0, &history, &recalled.1)?;
+        }
+        return playable(&history, &recalled, &run, folder, args.setpoints);
+    }
     let file = match &args.output {
         Some(file) => file.clone(),
         None => {
@@ -74,6 +89,40 @@ pub fn run(args: &ExportRunArgs) -> Result<(), Diagnostics> {
         file.display(),
         run.row.run
     ));
+    Ok(())
+}
+
+/// Writes a run as a model for MuJoCo into a new folder.
+fn playable(
+    history: &History,
+    recalled: &StoredCampaign,
+    run: &RunDetail,
+    folder: &Path,
+    with_setpoints: bool,
+) -> Result<(), Diagnostics> {
+    if folder.exists() {
+        let message = format!("{} already exists", folder.display());
+        let fault = Diagnostic::error("X042", message).help("name a new folder");
+        return Err(fault.into());
+    }
+    let context = RunContext {
+        clock: clock::system(),
+        disturb: None,
+    };
+    let played = quietly(|| campaign::playable(history, recalled, run, &context))?;
+    let below = output_file::folder(folder)?;
+    let write = |name: &str, text: &str| {
+        let file = folder.join(name);
+        let written = below.write_atomic(&file, text.as_bytes());
+        written.map_err(|error| output_file::cannot_write(&file, error))
+    };
+    write("scene.xml", &played.mjcf)?;
+    let mut written = "scene.xml holds".to_owned();
+    if with_setpoints {
+        write("setpoints.csv", &played.setpoints)?;
+        written = "scene.xml and setpoints.csv hold".to_owned();
+    }
+    output::print_prose(&format!("{}: {written} run {}\n", folder.display(), run.row.run));
     Ok(())
 }
 

@@ -35,6 +35,11 @@ pub fn convex_shape(solid: &Part) -> Option<(SharedShape, Pose)> {
     Some((shape, to_pose(&pose)))
 }
 
+/// Returns whether a convex solid has a volume: a hull of points in a plane has none.
+pub fn has_volume(solid: &Part) -> bool {
+    convex_shape(solid).is_some()
+}
+
 /// Returns the convex hull of points, or `None` if they lie in a plane.
 fn hull(points: &[[f64; 3]]) -> Option<SharedShape> {
     let points: Vec<_> = points

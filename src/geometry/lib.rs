@@ -21,7 +21,7 @@ mod surface;
 
 pub use ball::Ball;
 pub use convert::{from_pose, from_vector, to_pose, to_real, to_vector};
-pub use convex::convex_shape;
+pub use convex::{convex_shape, has_volume};
 pub use decompose::{DecompositionFault, decompose, decomposition_key, sheet, simplified};
 pub use hull::Hull;
 pub use neighbours::{Corners, Neighbours, SURE_M};

@@ -63,7 +63,7 @@ const CONTACT_DAMPING: f32 = 10.0;
 /// 8 cm in this unit, and looks at them in every step. Unit: metres.
 pub const LENGTH_UNIT: f32 = 0.125;
 /// Friction coefficient of the floor: that of wood.
-const FLOOR_FRICTION: f32 = 0.5;
+pub(super) const FLOOR_FRICTION: f32 = 0.5;
 
 /// Creates an engine without bodies.
 ///

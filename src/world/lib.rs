@@ -31,6 +31,7 @@ mod overlaps;
 mod ownership;
 mod patches;
 mod perturbation;
+mod playback;
 mod proximity;
 mod quality;
 mod reach;
@@ -50,6 +51,7 @@ pub use error::WorldError;
 pub use fault::{Fault, Perturbation, Poison};
 pub use fresh::narrow_phase;
 pub use overlaps::Overlap;
+pub use playback::{MotorGains, Playback, PlayedObject, PrincipalInertia, Setpoint, Surfaces};
 pub use reach::Shortcuts;
 pub use recorder::{Contact, Course, Record, Tracks};
 pub use sense::Sighting;
@@ -58,7 +60,7 @@ pub use simulation::{Command, Observation, World, build, build_with};
 pub use suction::would_seal;
 
 pub use actcheck_geometry::{
-    Cluster, DecompositionFault, Sphere, decompose, decomposition_key, sheet, simplified,
+    Cluster, DecompositionFault, Sphere, decompose, decomposition_key, has_volume, sheet, simplified,
     sphere_tree,
 };
 pub use actcheck_robot::{

@@ -24,11 +24,11 @@ use actcheck_geometry::{from_pose, from_vector, to_pose, to_real};
 /// this order. By Hertz, a ball of soft rubber (1.2 MPa, incompressible) with a radius of 4 cm that
 /// is pressed with 7 N touches a circle with a radius of 5.1 mm, and the mean lever under its
 /// pressure is 3π/16 of that. It is the same for all forces and shapes here. Unit: metres.
-const PAD_LEVER_M: f64 = 3e-3;
+pub(super) const PAD_LEVER_M: f64 = 3e-3;
 /// Lever of the force against which a thing rolls, one for all materials. Tables for engineers give
 /// 0.5 mm for iron or steel on the same, 1.2 mm to 1.5 mm for wood and 2 mm for plastic on steel.
 /// Unit: metres.
-const ROLLING_LEVER_M: f64 = 5e-4;
+pub(super) const ROLLING_LEVER_M: f64 = 5e-4;
 /// A thing that turns faster than this about an axis in the plane of a contact rolls. Unit: rad/s.
 const ROLLS_RAD_S: f64 = 0.1;
 /// Gain of the control of velocity that friction is: high, so that nothing creeps. Unit: N·m·s.

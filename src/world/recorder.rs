@@ -10,6 +10,7 @@ use crate::clearance::ClearanceMeter;
 use crate::contacts::Touch;
 use crate::engine::Owner;
 use crate::motion::MotionMeter;
+use crate::playback::Playback;
 use crate::quality::QualityMeter;
 use crate::robot_course::RobotMeter;
 use crate::samples::SampleMeter;
@@ -120,6 +121,8 @@ pub struct Recorder {
     pub(super) motion: MotionMeter,
     pub(super) clearance: ClearanceMeter,
     pub(super) samples: SampleMeter,
+    /// The playback for another engine, if it is kept.
+    pub(super) playback: Option<Playback>,
 }
 
 impl Recorder {
@@ -149,6 +152,7 @@ impl Recorder {
             motion: MotionMeter::default(),
             clearance: ClearanceMeter::default(),
             samples: SampleMeter::default(),
+            playback: None,
         }
     }
 
@@ -302,6 +306,7 @@ impl World {
     /// Records the state after a tick.
     pub(super) fn record(&mut self) {
         self.recorder.n_ticks += 1;
+        self.record_playback();
         self.digest_state();
         let recording = !self.recorder.rows.is_empty();
         if recording {

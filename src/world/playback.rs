@@ -1,0 +1,208 @@
+//! What another physics engine needs, beside the scene, to play the robot's part of a run: the
+//! motors with their setpoints in each control tick, the masses that are simulated, and the links
+//! that collide.
+
+use nalgebra::Vector3;
+
+use rapier3d::prelude::RigidBodyHandle;
+
+use crate::World;
+use crate::engine::FLOOR_FRICTION;
+use crate::motor::Motor;
+use crate::patches::{PAD_LEVER_M, ROLLING_LEVER_M};
+use actcheck_data::Pose;
+use actcheck_geometry::from_vector;
+
+/// The robot's part of a run for another engine.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Playback {
+    /// Length of a control tick. Unit: seconds.
+    pub tick_secs: f64,
+    /// The motor of each joint, in the order of [`Kinematics::joints`](crate::Kinematics::joints).
+    pub motors: Vec<MotorGains>,
+    /// Position of each joint at the start. Units: metres or radians.
+    pub start: Vec<f64>,
+    /// Pose of each link at the start. Frame: world.
+    pub links: Vec<Pose>,
+    /// The links that collide with each other, with the smaller index first.
+    pub link_pairs: Vec<(usize, usize)>,
+    /// Whether each link passes through the floor, as the wheels of a planar base do.
+    pub off_floor: Vec<bool>,
+    /// Friction coefficient of each link.
+    pub link_friction: Vec<f64>,
+    /// Whether each link is a finger, whose surface is a pad.
+    pub pads: Vec<bool>,
+    /// The surfaces that the scene does not state.
+    pub surfaces: Surfaces,
+    /// The objects, in the order of the scene.
+    pub objects: Vec<PlayedObject>,
+    /// The setpoints at the end of each control tick, one for each joint.
+    pub ticks: Vec<Vec<Setpoint>>,
+}
+
+/// Surfaces that are the same in all scenes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surfaces {
+    /// Friction coefficient of the floor. That of two surfaces is the geometric mean of theirs.
+    pub floor_friction: f64,
+    /// Mean lever of the friction of a pad about the normal of its contact. Unit: metres.
+    pub pad_lever_m: f64,
+    /// Lever of the force against which a thing rolls. Unit: metres.
+    pub rolling_lever_m: f64,
+}
+
+/// The constants of a joint's motor: its effort is
+/// `stiffness · (position − actual) + damping · (velocity − actual)` within its limit, in addition
+/// to gravity compensation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MotorGains {
+    /// Units: N/m or N·m/rad.
+    pub stiffness: f64,
+    /// Units: N·s/m or N·m·s/rad.
+    pub damping: f64,
+    /// Inertia of its rotor, as the joint feels it. Units: kilograms or kg·m².
+    pub armature: f64,
+}
+
+/// The demand on a motor at the end of a control tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Setpoint {
+    /// Position; it moves there evenly from that of the tick before. Frame of the base: the
+    /// world's, whatever the robot believes. Units: metres or radians.
+    pub position: f64,
+    /// Velocity of the setpoint. Units: m/s or rad/s.
+    pub velocity: f64,
+    /// Largest effort. Units: newtons or newton metres.
+    pub limit: f64,
+    /// The effort that is commanded instead of a position. Units: newtons or newton metres.
+    pub effort: Option<f64>,
+}
+
+/// An object as it is simulated at the start.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlayedObject {
+    /// Id in the scene.
+    pub id: String,
+    /// Pose of the model's origin. Frame: world.
+    pub pose: Pose,
+    /// Velocity of its origin. Unit: m/s. Frame: world.
+    pub linear_velocity: [f64; 3],
+    /// Unit: rad/s. Frame: world.
+    pub angular_velocity: [f64; 3],
+    /// Its masses; `None` if it can't move.
+    pub inertia: Option<PrincipalInertia>,
+    /// Position of the joint that moves it, if it is a part of another object. Units: metres or
+    /// radians.
+    pub joint_position: Option<f64>,
+}
+
+/// The mass distribution of a body, along its principal axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PrincipalInertia {
+    /// Unit: kilograms.
+    pub mass_kg: f64,
+    /// Pose of the principal axes: the centre of mass and their orientation. Frame: the model's.
+    pub frame: Pose,
+    /// Moments of inertia about these axes. Unit: kg·m².
+    pub moments: [f64; 3],
+}
+
+impl Motor {
+    fn gains(&self) -> MotorGains {
+        MotorGains {
+            stiffness: self.stiffness,
+            damping: self.damping,
+            armature: self.armature,
+        }
+    }
+
+    fn setpoint(&self) -> Setpoint {
+        Setpoint {
+            position: self.setpoint,
+            velocity: self.setpoint_velocity,
+            limit: self.max_effort,
+            effort: self.push,
+        }
+    }
+}
+
+impl World {
+    /// Starts a playback at the present state, which ends with [`World::take_playback`].
+    pub fn keep_playback(&mut self) {
+        let objects = (0..self.objects.len()).map(|idx| self.played(idx)).collect();
+        let robot = &self.robot;
+        self.recorder.playback = Some(Playback {
+            tick_secs: self.tick_secs(),
+            motors: robot.motors.iter().map(Motor::gains).collect(),
+            start: robot.positions.clone(),
+            links: robot
+                .kinematics
+                .links(&robot.positions)
+                .iter()
+                .map(Pose::from_isometry)
+                .collect(),
+            link_pairs: self.link_pairs.iter().collect(),
+            off_floor: robot.off_floor.clone(),
+            link_friction: robot.bodies.iter().map(|body| self.friction_of(*body)).collect(),
+            pads: (0..robot.bodies.len()).map(|link| robot.is_pad(link)).collect(),
+            surfaces: Surfaces {
+                floor_friction: f64::from(FLOOR_FRICTION),
+                pad_lever_m: PAD_LEVER_M,
+                rolling_lever_m: ROLLING_LEVER_M,
+            },
+            objects,
+            ticks: Vec::new(),
+        });
+    }
+
+    /// Returns the playback since [`World::keep_playback`]; `None` without it.
+    pub fn take_playback(&mut self) -> Option<Playback> {
+        self.recorder.playback.take()
+    }
+
+    /// Adds the setpoints of the tick that ends.
+    pub(super) fn record_playback(&mut self) {
+        if let Some(playback) = &mut self.recorder.playback {
+            let setpoints = self.robot.motors.iter().map(Motor::setpoint);
+            playback.ticks.push(setpoints.collect());
+        }
+    }
+
+    /// The friction coefficient of a link's shapes; 0 without shapes.
+    fn friction_of(&self, body: RigidBodyHandle) -> f64 {
+        self.colliders_of(body)
+            .next()
+            .map_or(0.0, |collider| f64::from(collider.friction()))
+    }
+
+    fn played(&self, idx: usize) -> PlayedObject {
+        let object = &self.objects[idx];
+        let body = self.engine.bodies.get(object.body);
+        let moving = body.filter(|body| !body.is_fixed());
+        let velocities = moving.map_or([Vector3::zeros(); 2], |body| {
+            let linear = body.velocity_at_point(body.translation());
+            [from_vector(linear), from_vector(body.angvel())]
+        });
+        let inertia = moving.map(|body| {
+            let properties = &body.mass_properties().local_mprops;
+            let turn = properties.principal_inertia_local_frame.to_array();
+            PrincipalInertia {
+                mass_kg: object.mass_kg,
+                frame: Pose {
+                    position: from_vector(properties.local_com).into(),
+                    rotation: turn.map(f64::from),
+                },
+                moments: from_vector(properties.principal_inertia()).into(),
+            }
+        });
+        PlayedObject {
+            id: object.id.clone(),
+            pose: Pose::from_isometry(&self.pose_of(object)),
+            linear_velocity: velocities[0].into(),
+            angular_velocity: velocities[1].into(),
+            inertia,
+            joint_position: self.part_position(object),
+        }
+    }
+}
+
