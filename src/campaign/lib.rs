@@ -8,6 +8,7 @@ mod broken_runs;
 mod budget;
 mod case;
 mod changes;
+mod cross_check;
 mod difference;
 mod environment;
 mod episode;
@@ -48,6 +49,10 @@ mod workers;
 pub use actcheck_world::{FingerJoint, Proposal, UnknownHand};
 pub use budget::ExhaustedBudget;
 pub use changes::{ChangeKind, InputChange, changes, made_by_other_physics, other_physics};
+pub use cross_check::{
+    JudgedProperty, OwnContact, Parting, RunInBoth, decided, in_both, judge_played, mapping_of,
+    rules_of,
+};
 pub use difference::TraceDifference;
 pub use environment::Env;
 pub use episode::EpisodeFile;
@@ -58,7 +63,7 @@ pub use import::{ImportEnd, ImportOptions, ImportedCampaign, import, name_of_imp
 pub use last_failed::LastFailed;
 pub use line::{Clock, Disturbance, RunContext, RunInput, run_line, run_sabotaged};
 pub use outcome::{CampaignResult, Ending, WeightedRate};
-pub use playable::{Playable, playable};
+pub use playable::{Playable, PlayableRun, PlayedAction, playable};
 pub use recheck::{RecheckEnd, RecheckOptions, judge_stored, recheck};
 pub use replay::{
     Fit, Misfit, MisfitKind, OutcomeChange, Replay, ReplayOptions, StoredCampaign, replay_all,
@@ -70,4 +75,4 @@ pub use run_all::{CampaignOptions, resume_all, run_all};
 pub use run_cases::{CaseRun, run_cases};
 pub use schedule::{Planned, PropertyOutcome, RunResult, Schedule, Steering, schedule_of};
 pub use solids::proposed_robot;
-pub use workers::side_by_side;
+pub use workers::{on_workers, side_by_side};

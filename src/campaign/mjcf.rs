@@ -18,8 +18,8 @@ use actcheck_world::{
     GRAVITY, Joint, JointKind, Playback, PlayedObject, Robot, Setpoint, has_volume,
 };
 
-/// Steps of MuJoCo in a control tick: those of half a substep of ours would change nothing.
-const STEPS_PER_TICK: f64 = 8.0;
+/// Steps of MuJoCo in a control tick.
+const STEPS_PER_TICK: f64 = 4.0;
 /// Mass and inertia of links without any, which MuJoCo refuses. Units: kilograms and kg·m².
 const LEAST_KG: f64 = 1e-4;
 const LEAST_KG_M2: f64 = 1e-7;
@@ -56,7 +56,11 @@ pub(super) fn write(run: &str, robot: &Robot, scene: &Scene, playback: &Playback
             ("impratio", "10".to_owned()),
         ],
     );
-    let bodies = Bodies { robot, scene, playback };
+    let bodies = Bodies {
+        robot,
+        scene,
+        playback,
+    };
     bodies.assets(&mut out);
     out.open("worldbody", Vec::new());
     out.leaf(
@@ -90,7 +94,13 @@ pub(super) fn setpoints(robot: &Robot, playback: &Playback) -> String {
     out.push('\n');
     for (tick, setpoints) in playback.ticks.iter().enumerate() {
         _ = write!(out, "{}", (tick + 1) as f64 * playback.tick_secs);
-        for Setpoint { position, velocity, limit, effort } in setpoints {
+        for Setpoint {
+            position,
+            velocity,
+            limit,
+            effort,
+        } in setpoints
+        {
             _ = write!(out, ",{position},{velocity},{limit},");
             if let Some(effort) = effort {
                 _ = write!(out, "{effort}");
@@ -171,7 +181,10 @@ impl Bodies<'_> {
             geom(out, &object.id, number, solid, attributes);
         }
         for (part, carried) in self.scene.objects.iter().enumerate() {
-            let by_this = carried.attached.as_ref().is_some_and(|by| by.to == object.id);
+            let by_this = carried
+                .attached
+                .as_ref()
+                .is_some_and(|by| by.to == object.id);
             if by_this {
                 self.object(out, part, Some(played));
             }
@@ -182,12 +195,17 @@ impl Bodies<'_> {
     /// Writes a link of the robot with those that it carries.
     fn link(&self, out: &mut Document, idx: usize) {
         let (model, pose) = (&self.robot.model, self.playback.links[idx].to_isometry());
-        let joint = idx.checked_sub(1).map(|joint| (joint, &model.joints[joint]));
+        let joint = idx
+            .checked_sub(1)
+            .map(|joint| (joint, &model.joints[joint]));
         let local = match joint {
             Some((_, joint)) => self.playback.links[joint.parent].to_isometry().inverse() * pose,
             None => pose,
         };
-        let mut attributes = with_pose(vec![("name", self.link_name(idx))], &Pose::from_isometry(&local));
+        let mut attributes = with_pose(
+            vec![("name", self.link_name(idx))],
+            &Pose::from_isometry(&local),
+        );
         if joint.is_some() {
             attributes.push(("gravcomp", "1".to_owned()));
         }
@@ -199,13 +217,22 @@ impl Bodies<'_> {
         }
         let friction = text(self.playback.link_friction[idx]);
         for (number, solid) in solids(&link.solids).iter().enumerate() {
-            geom(out, &self.link_name(idx), number, solid, vec![("friction", friction.clone())]);
+            geom(
+                out,
+                &self.link_name(idx),
+                number,
+                solid,
+                vec![("friction", friction.clone())],
+            );
         }
         let (grasp, at) = &self.robot.named.grasp;
         if *grasp == idx {
             out.leaf(
                 "site",
-                with_pose(vec![("name", "robot/grasp".to_owned())], &Pose::from_isometry(at)),
+                with_pose(
+                    vec![("name", "robot/grasp".to_owned())],
+                    &Pose::from_isometry(at),
+                ),
             );
         }
         for (number, child) in model.joints.iter().enumerate() {
@@ -231,7 +258,10 @@ impl Bodies<'_> {
             ("armature", text(motor.armature)),
         ];
         if joint.lower.is_finite() && joint.upper.is_finite() && joint.lower < joint.upper {
-            attributes.push(("range", format!("{} {}", text(joint.lower), text(joint.upper))));
+            attributes.push((
+                "range",
+                format!("{} {}", text(joint.lower), text(joint.upper)),
+            ));
         }
         out.leaf("joint", attributes);
     }
@@ -246,7 +276,9 @@ impl Bodies<'_> {
             out.leaf("exclude", pair);
         };
         let links = &self.robot.model.links;
-        let solid: Vec<usize> = (0..links.len()).filter(|idx| !links[*idx].solids.is_empty()).collect();
+        let solid: Vec<usize> = (0..links.len())
+            .filter(|idx| !links[*idx].solids.is_empty())
+            .collect();
         for first in &solid {
             for second in solid.iter().filter(|second| *second > first) {
                 if !playback.link_pairs.contains(&(*first, *second)) {
@@ -277,7 +309,11 @@ impl Bodies<'_> {
         let objects = &self.scene.objects;
         let mut found = Vec::new();
         for (idx, one) in objects.iter().enumerate() {
-            for other in objects.iter().skip(idx + 1).filter(|other| other.attached.is_some() || one.attached.is_some()) {
+            for other in objects
+                .iter()
+                .skip(idx + 1)
+                .filter(|other| other.attached.is_some() || one.attached.is_some())
+            {
                 if whole(one) == whole(other) {
                     found.push((other.id.as_str(), one.id.as_str()));
                 }
@@ -291,9 +327,13 @@ impl Bodies<'_> {
         let (playback, surfaces) = (self.playback, &self.playback.surfaces);
         let own = object.model.solids();
         let mean = |friction: f64| (friction * object.friction).sqrt();
-        let mut all: Vec<(String, f64, bool)> = vec![("floor".to_owned(), surfaces.floor_friction, false)];
+        let mut all: Vec<(String, f64, bool)> =
+            vec![("floor".to_owned(), surfaces.floor_friction, false)];
         for (other, played) in self.scene.objects.iter().zip(&playback.objects) {
-            let is_own = object.attached.as_ref().is_some_and(|by| by.whole == other.id);
+            let is_own = object
+                .attached
+                .as_ref()
+                .is_some_and(|by| by.whole == other.id);
             if played.inertia.is_none() && !is_own {
                 let names = named(&other.id, &other.model.solids());
                 all.extend(names.into_iter().map(|name| (name, other.friction, false)));
@@ -302,10 +342,18 @@ impl Bodies<'_> {
         for (idx, link) in self.robot.model.links.iter().enumerate() {
             if playback.pads[idx] {
                 let names = named(&self.link_name(idx), &solids(&link.solids));
-                all.extend(names.into_iter().map(|name| (name, playback.link_friction[idx], true)));
+                all.extend(
+                    names
+                        .into_iter()
+                        .map(|name| (name, playback.link_friction[idx], true)),
+                );
             }
         }
-        for (number, solid) in own.iter().enumerate().filter(|(_, solid)| has_volume(solid)) {
+        for (number, solid) in own
+            .iter()
+            .enumerate()
+            .filter(|(_, solid)| has_volume(solid))
+        {
             for (name, friction, is_pad) in &all {
                 let slides = mean(*friction);
                 let (condim, torsion, rolling) = match (*is_pad, is_round(&solid.shape)) {
@@ -355,7 +403,11 @@ impl Bodies<'_> {
         for (idx, joint) in self.robot.model.joints.iter().enumerate() {
             let motor = &self.playback.motors[idx];
             // The limits of the first tick: those of fingers change with the commands.
-            let limit = self.playback.ticks.first().map_or(joint.effort, |tick| tick[idx].limit);
+            let limit = self
+                .playback
+                .ticks
+                .first()
+                .map_or(joint.effort, |tick| tick[idx].limit);
             if joint.mimic.is_some() && limit <= 0.0 {
                 continue;
             }
@@ -367,8 +419,14 @@ impl Bodies<'_> {
                     ("joint", joint_name(joint)),
                     ("biastype", "affine".to_owned()),
                     ("gainprm", text(motor.stiffness)),
-                    ("biasprm", format!("0 {} {}", text(-motor.stiffness), text(-motor.damping))),
-                    ("forcerange", format!("{} {}", text(-largest), text(largest))),
+                    (
+                        "biasprm",
+                        format!("0 {} {}", text(-motor.stiffness), text(-motor.damping)),
+                    ),
+                    (
+                        "forcerange",
+                        format!("{} {}", text(-largest), text(largest)),
+                    ),
                 ],
             );
         }
@@ -390,12 +448,16 @@ fn part_joint(out: &mut Document, object: &SceneObject, played: &PlayedObject) {
         return;
     };
     let joint = &attached.joint;
-    let on_part: Isometry3<f64> = object.pose.to_isometry().inverse() * attached.frame.to_isometry();
+    let on_part: Isometry3<f64> =
+        object.pose.to_isometry().inverse() * attached.frame.to_isometry();
     let axis = on_part.rotation * Vector3::from(joint.axis);
     let anchor = on_part * nalgebra::Point3::from(joint.anchor_m);
     let mut attributes = vec![
         ("name", object.id.clone()),
-        ("type", if joint.slides { "slide" } else { "hinge" }.to_owned()),
+        (
+            "type",
+            if joint.slides { "slide" } else { "hinge" }.to_owned(),
+        ),
         ("axis", texts(axis.into())),
         ("pos", texts(anchor.coords.into())),
         ("ref", text(played.joint_position.unwrap_or(0.0))),
@@ -410,7 +472,11 @@ fn part_joint(out: &mut Document, object: &SceneObject, played: &PlayedObject) {
 
 fn inertial(mass: f64, com: &Vector3<f64>, tensor: &nalgebra::Matrix3<f64>) -> Attributes {
     // A virtual link of a base has no mass. Its inertia is small beside that of what it carries.
-    let least = if tensor.diagonal().min() < LEAST_KG_M2 { LEAST_KG_M2 } else { 0.0 };
+    let least = if tensor.diagonal().min() < LEAST_KG_M2 {
+        LEAST_KG_M2
+    } else {
+        0.0
+    };
     let t = tensor + nalgebra::Matrix3::identity() * least;
     let six = [t.m11, t.m22, t.m33, t.m12, t.m13, t.m23];
     vec![
@@ -436,8 +502,13 @@ fn geom_name(body: &str, number: usize) -> String {
 
 /// Names of the geoms of a body's solids.
 fn named(body: &str, solids: &[Part]) -> Vec<String> {
-    let numbered = solids.iter().enumerate().filter(|(_, solid)| has_volume(solid));
-    numbered.map(|(number, _)| geom_name(body, number)).collect()
+    let numbered = solids
+        .iter()
+        .enumerate()
+        .filter(|(_, solid)| has_volume(solid));
+    numbered
+        .map(|(number, _)| geom_name(body, number))
+        .collect()
 }
 
 /// Writes the points of a body's hulls.
@@ -475,14 +546,18 @@ fn geom(out: &mut Document, body: &str, number: usize, solid: &Part, more: Attri
     let name = geom_name(body, number);
     let own = match &solid.shape {
         Shape::Box { size } => ("box", ("size", texts(size.map(|x| x / 2.0)))),
-        Shape::Cylinder { radius, height } => {
-            ("cylinder", ("size", format!("{} {}", text(*radius), text(height / 2.0))))
-        }
+        Shape::Cylinder { radius, height } => (
+            "cylinder",
+            ("size", format!("{} {}", text(*radius), text(height / 2.0))),
+        ),
         Shape::Sphere { radius } => ("sphere", ("size", text(*radius))),
-        Shape::Capsule { radius, height } => {
-            ("capsule", ("size", format!("{} {}", text(*radius), text(height / 2.0))))
+        Shape::Capsule { radius, height } => (
+            "capsule",
+            ("size", format!("{} {}", text(*radius), text(height / 2.0))),
+        ),
+        Shape::Hull { .. } | Shape::Mesh { .. } | Shape::Tube { .. } => {
+            ("mesh", ("mesh", name.clone()))
         }
-        Shape::Hull { .. } | Shape::Mesh { .. } | Shape::Tube { .. } => ("mesh", ("mesh", name.clone())),
     };
     let mut attributes = vec![("name", name), ("type", own.0.to_owned()), own.1];
     attributes.extend(more);
@@ -543,6 +618,10 @@ impl Document {
 }
 
 fn element(name: &'static str, attributes: &Attributes) -> BytesStart<'static> {
-    let attributes = attributes.iter().map(|(name, value)| (*name, value.as_str()));
-    BytesStart::new(name).with_attributes(attributes).into_owned()
+    let attributes = attributes
+        .iter()
+        .map(|(name, value)| (*name, value.as_str()));
+    BytesStart::new(name)
+        .with_attributes(attributes)
+        .into_owned()
 }

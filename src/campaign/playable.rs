@@ -1,12 +1,15 @@
-//! A stored run for another physics engine: its model and its setpoints.
+//! A stored run for another physics engine: its model, its setpoints and its actions.
+
+use std::collections::BTreeMap;
 
 use crate::attempt::Attempt;
+use crate::finished_run::RunPlace;
 use crate::replay::{cut_secs, refused};
 use crate::{RunContext, StoredCampaign, mjcf};
 use actcheck_actions::Cut;
 use actcheck_base::{Diagnostic, Diagnostics};
-use actcheck_data::Choices;
-use actcheck_history::{History, RunDetail};
+use actcheck_data::{ActionEnd, CONTROL_HZ, Choices, Trace};
+use actcheck_history::{History, RunDetail, RunRecord};
 
 /// A run that another engine can play.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,6 +18,36 @@ pub struct Playable {
     pub mjcf: String,
     /// The robot's setpoints in each control tick, as CSV.
     pub setpoints: String,
+}
+
+/// An action of a run that another engine plays.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlayedAction {
+    /// Name of the action.
+    pub action: String,
+    /// Values of its designators.
+    pub parameters: BTreeMap<String, Vec<String>>,
+    /// Number of control ticks before it and before its end.
+    pub ticks: [u64; 2],
+    /// Its report: whether it succeeded, and its words; `None` if it gave none.
+    pub report: Option<(bool, String)>,
+    /// Whether the fingers held an object at its end.
+    pub holds: bool,
+}
+
+/// A run that was simulated again for another engine.
+#[derive(Debug, Clone)]
+pub struct PlayableRun {
+    /// The files for the engine.
+    pub files: Playable,
+    /// Its actions.
+    pub actions: Vec<PlayedAction>,
+    /// Names of the bodies of the fingers, left and right.
+    pub fingers: [Vec<String>; 2],
+    /// Name of the body of the robot's base.
+    pub base: String,
+    /// The run here, judged by the present rules.
+    pub record: RunRecord,
 }
 
 /// Simulates a stored run again, and returns what another engine needs to play it.
@@ -27,7 +60,7 @@ pub fn playable(
     (env, record): &StoredCampaign,
     detail: &RunDetail,
     context: &RunContext,
-) -> Result<Playable, Diagnostics> {
+) -> Result<PlayableRun, Diagnostics> {
     if env.campaign.robot.suction.is_some() {
         let message = format!(
             "run {} can't be written as MJCF: its robot holds things by a suction cup, whose seal MuJoCo does not have",
@@ -53,11 +86,67 @@ pub fn playable(
     };
     if run.trace.hash != was.hash {
         let why = "it now has other states: a model, the configuration or the program changed";
-        let help = "`actcheck replay RUN` names the first difference; a run made today can be written";
+        let help =
+            "`actcheck replay RUN` names the first difference; a run made today can be written";
         return Err(refused(detail, why).help(help).into());
     }
-    Ok(Playable {
-        mjcf: mjcf::write(&detail.row.run, &env.robot, &run.scene, &playback),
-        setpoints: mjcf::setpoints(&env.robot, &playback),
+    let links = &env.robot.model.links;
+    let name = |link: &usize| format!("robot/{}", links[*link].name);
+    let base = env
+        .robot
+        .named
+        .layout
+        .base
+        .map_or(0, |[.., heading]| heading + 1);
+    Ok(PlayableRun {
+        files: Playable {
+            mjcf: mjcf::write(&detail.row.run, &env.robot, &run.scene, &playback),
+            setpoints: mjcf::setpoints(&env.robot, &playback),
+        },
+        actions: played_actions(&run.trace),
+        fingers: env
+            .robot
+            .named
+            .fingers
+            .each_ref()
+            .map(|finger| finger.iter().map(name).collect()),
+        base: name(&base),
+        record: run.into_record(RunPlace::alone(&record.id)),
     })
+}
+
+/// The actions that were performed, with their control ticks.
+fn played_actions(trace: &Trace) -> Vec<PlayedAction> {
+    let mut began = 0;
+    let mut actions = Vec::new();
+    for (action, end) in trace.actions.iter().zip(trace.snapshots.iter().skip(1)) {
+        if matches!(
+            action.end,
+            ActionEnd::NotReached | ActionEnd::NotPerformed(_)
+        ) {
+            continue;
+        }
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a number of control ticks"
+        )]
+        let ticks = (action.duration_secs * f64::from(CONTROL_HZ)).round() as u64;
+        let robot = &end.robot;
+        actions.push(PlayedAction {
+            action: action.action.clone(),
+            parameters: action.parameters.clone(),
+            ticks: [began, began + ticks],
+            report: action
+                .report
+                .as_ref()
+                .map(|report| (report.succeeded, report.message.clone())),
+            holds: robot
+                .left_touches
+                .iter()
+                .any(|thing| robot.right_touches.contains(thing)),
+        });
+        began += ticks;
+    }
+    actions
 }

@@ -1,5 +1,6 @@
 //! The thread pool of a command: one simulation or judgement for each worker at a time.
 
+use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use actcheck_base::{Diagnostic, Diagnostics};
@@ -13,6 +14,18 @@ pub(super) fn workers(jobs: usize) -> Result<ThreadPool, Diagnostics> {
     pool.map_err(|error| {
         Diagnostic::error("X010", format!("workers can't be started: {error}")).into()
     })
+}
+
+/// Does the same with each thing on several workers. The results are in the order of the things.
+///
+/// # Errors
+/// `X010` if the workers can't be started.
+pub fn on_workers<T: Sync, R: Send>(
+    jobs: usize,
+    things: &[T],
+    work: impl Fn(&T) -> R + Sync + Send,
+) -> Result<Vec<R>, Diagnostics> {
+    Ok(workers(jobs)?.install(|| things.par_iter().map(work).collect()))
 }
 
 /// Does two things side by side with two workers or more, otherwise one after the other.

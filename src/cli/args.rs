@@ -278,6 +278,19 @@ pub enum Command {
     /// Exit code: 0 all premises hold, 1 one does not, 2 an episode could not be read.
     #[command(after_help = "Example:\n  actcheck check-episodes episodes/ --mapping mapping.toml")]
     CheckEpisodes(crate::check_episodes::CheckEpisodesArgs),
+    /// Play runs of a campaign in MuJoCo and compare the verdicts: is it the robot or the engine?
+    ///
+    /// The runs are simulated again, and MuJoCo plays the robot's setpoints in the same scenes. Its
+    /// courses are stored as a campaign of their own, judged by the present rules. For each property
+    /// the agreement is printed, beside MuJoCo's agreement with itself under four other settings;
+    /// for each disagreement, where the courses part. Runs that any engine or setting decides
+    /// otherwise are contested: `list` and `compare` mark them.
+    ///
+    /// Exit code: 0 all properties agree in all runs, 1 some do not, 2 a run could not be compared.
+    #[command(
+        after_help = "Example:\n  actcheck cross-check k7f3 --runs 100 --python venv/bin/python    (with: pip install mujoco mcap)"
+    )]
+    CrossCheck(crate::cross_check::CrossCheckArgs),
     /// Export a stored run as a case, or the history as tables or RDF, or send it to a SPARQL store
     #[command(
         after_help = "Examples:\n  actcheck export run k7f3-3 -o case.toml    (a run id from `actcheck list`; a prefix is enough)\n  actcheck export tables columns    (after `actcheck run configs/pick.toml`)\n  actcheck export rdf history.nq\n  actcheck export store http://localhost:3030/history/update    (another store, such as Fuseki)"

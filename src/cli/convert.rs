@@ -159,7 +159,7 @@ pub fn faulty_episodes(suite: &str, python: &Path) -> Result<Converted, Diagnost
 }
 
 /// Creates a temporary folder with the Python package.
-fn new_scratch() -> Result<ScratchFolder, Diagnostics> {
+pub(super) fn new_scratch() -> Result<ScratchFolder, Diagnostics> {
     let scratch = ScratchFolder::create().map_err(|error| {
         Diagnostic::error("E008", format!("can't create a temporary folder: {error}"))
             .help("name another folder in TMPDIR")

@@ -19,9 +19,11 @@ const WRITES_A_RUN: [&str; 2] = ["--mjcf", "--setpoints"];
 /// Adds the kind `run` to an export of a run that does without it.
 fn with_kind_of_export(mut words: Vec<OsString>) -> Vec<OsString> {
     let is_export = words.get(1).is_some_and(|word| word == "export");
-    let names_none = words
-        .get(2)
-        .is_some_and(|word| ["run", "tables", "rdf", "store", "help"].iter().all(|kind| word != kind));
+    let names_none = words.get(2).is_some_and(|word| {
+        ["run", "tables", "rdf", "store", "help"]
+            .iter()
+            .all(|kind| word != kind)
+    });
     let writes = |word: &OsString| {
         let name = word.to_string_lossy();
         let name = name.split_once('=').map_or(&*name, |(name, _)| name);
@@ -55,6 +57,7 @@ pub fn run(sources_digest: &'static str) -> ExitCode {
         Command::Compare(args) => crate::compare::compare(&args),
         Command::Bisect(args) => crate::bisect::bisect(&args),
         Command::CheckEpisodes(args) => crate::check_episodes::check_episodes(&args),
+        Command::CrossCheck(args) => crate::cross_check::cross_check(&args),
         Command::CheckOracles(args) => check_oracles::check_oracles(&args),
         Command::Explain(args) => explain::explain(&args).map(|()| 0),
         Command::Export(args) => export::export(&args),
@@ -89,11 +92,23 @@ mod tests {
     fn a_run_is_exported_without_the_kind() {
         let words = |text: &str| text.split(' ').map(OsString::from).collect::<Vec<_>>();
         for (given, read) in [
-            ("actcheck export k7f3-3 --mjcf d", "actcheck export run k7f3-3 --mjcf d"),
-            ("actcheck export --mjcf=d k7f3-3", "actcheck export run --mjcf=d k7f3-3"),
-            ("actcheck export run k7f3-3 --mjcf d", "actcheck export run k7f3-3 --mjcf d"),
+            (
+                "actcheck export k7f3-3 --mjcf d",
+                "actcheck export run k7f3-3 --mjcf d",
+            ),
+            (
+                "actcheck export --mjcf=d k7f3-3",
+                "actcheck export run --mjcf=d k7f3-3",
+            ),
+            (
+                "actcheck export run k7f3-3 --mjcf d",
+                "actcheck export run k7f3-3 --mjcf d",
+            ),
             ("actcheck export tabels d", "actcheck export tabels d"),
-            ("actcheck show k7f3-3 --mjcf d", "actcheck show k7f3-3 --mjcf d"),
+            (
+                "actcheck show k7f3-3 --mjcf d",
+                "actcheck show k7f3-3 --mjcf d",
+            ),
         ] {
             assert_eq!(with_kind_of_export(words(given)), words(read), "{given}");
         }

@@ -109,7 +109,7 @@ fn playable(
         clock: clock::system(),
         disturb: None,
     };
-    let played = quietly(|| campaign::playable(history, recalled, run, &context))?;
+    let played = quietly(|| campaign::playable(history, recalled, run, &context))?.files;
     let below = output_file::folder(folder)?;
     let write = |name: &str, text: &str| {
         let file = folder.join(name);
@@ -122,7 +122,11 @@ fn playable(
         write("setpoints.csv", &played.setpoints)?;
         written = "scene.xml and setpoints.csv hold".to_owned();
     }
-    output::print_prose(&format!("{}: {written} run {}\n", folder.display(), run.row.run));
+    output::print_prose(&format!(
+        "{}: {written} run {}\n",
+        folder.display(),
+        run.row.run
+    ));
     Ok(())
 }
 

@@ -40,6 +40,7 @@ const GROUPS: [Group; 2] = [
             "merge",
             "import",
             "check-episodes",
+            "cross-check",
             "export",
             "check-oracles",
             "datalog",

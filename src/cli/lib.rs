@@ -20,6 +20,7 @@ mod compare;
 mod completions;
 mod configurations;
 mod convert;
+mod cross_check;
 mod datalog;
 mod entry;
 mod explain;

@@ -119,9 +119,13 @@ impl Thing {
     }
 }
 
-/// Returns the name of a link, as it appears in a trace.
+/// Returns the name of a link, as it appears in a trace. Models that actcheck wrote have it already.
 pub(crate) fn link_name(body: &str) -> String {
-    format!("robot/{body}")
+    if body.starts_with("robot/") {
+        body.to_owned()
+    } else {
+        format!("robot/{body}")
+    }
 }
 
 /// Returns the rotation of a frame whose z axis is the axis of a body that is nearest to the

@@ -8,6 +8,7 @@ mod campaign;
 mod campaign_state;
 mod campaigns;
 mod counted;
+mod cross_check;
 mod dump;
 mod entry;
 mod evaluation;
@@ -51,6 +52,7 @@ mod writers;
 
 pub use answer::{Cancel, QueryAnswer};
 pub use counted::{FAILED_AGAIN, newest_of_alike, without_counts};
+pub use cross_check::CrossCheck;
 pub use dump::RdfExport;
 pub use entry::Entry;
 pub use foreign::{ForeignAnswer, check_query};

@@ -60,8 +60,8 @@ pub use simulation::{Command, Observation, World, build, build_with};
 pub use suction::would_seal;
 
 pub use actcheck_geometry::{
-    Cluster, DecompositionFault, Sphere, decompose, decomposition_key, has_volume, sheet, simplified,
-    sphere_tree,
+    Cluster, DecompositionFault, Sphere, decompose, decomposition_key, has_volume, sheet,
+    simplified, sphere_tree,
 };
 pub use actcheck_robot::{
     BalancedJoint, Dynamics, FingerJoint, GRAVITY, Gripper, GripperFault, Joint, JointKind,

@@ -129,7 +129,9 @@ impl Motor {
 impl World {
     /// Starts a playback at the present state, which ends with [`World::take_playback`].
     pub fn keep_playback(&mut self) {
-        let objects = (0..self.objects.len()).map(|idx| self.played(idx)).collect();
+        let objects = (0..self.objects.len())
+            .map(|idx| self.played(idx))
+            .collect();
         let robot = &self.robot;
         self.recorder.playback = Some(Playback {
             tick_secs: self.tick_secs(),
@@ -143,8 +145,14 @@ impl World {
                 .collect(),
             link_pairs: self.link_pairs.iter().collect(),
             off_floor: robot.off_floor.clone(),
-            link_friction: robot.bodies.iter().map(|body| self.friction_of(*body)).collect(),
-            pads: (0..robot.bodies.len()).map(|link| robot.is_pad(link)).collect(),
+            link_friction: robot
+                .bodies
+                .iter()
+                .map(|body| self.friction_of(*body))
+                .collect(),
+            pads: (0..robot.bodies.len())
+                .map(|link| robot.is_pad(link))
+                .collect(),
             surfaces: Surfaces {
                 floor_friction: f64::from(FLOOR_FRICTION),
                 pad_lever_m: PAD_LEVER_M,
@@ -205,4 +213,3 @@ impl World {
         }
     }
 }
-

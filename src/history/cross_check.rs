@@ -1,0 +1,73 @@
+//! The runs whose verdicts another physics engine confirms or contests.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use crate::History;
+use actcheck_base::{Below, Diagnostic, Diagnostics};
+
+/// Folder of the cross-checks in a history.
+const FOLDER: &str = "cross-checks";
+/// Largest file of a cross-check. Unit: bytes.
+const MOST_BYTES: u64 = 256 << 20;
+
+/// The comparison of runs of a campaign with the same runs in another engine.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CrossCheck {
+    /// Id of the campaign.
+    pub campaign: String,
+    /// The other engine with its version.
+    pub engine: String,
+    /// Id of the campaign with its courses.
+    pub imported: Option<String>,
+    /// Each compared run with the local names of its properties that the other engine, or one of
+    /// its settings, decides otherwise.
+    pub runs: BTreeMap<String, BTreeSet<String>>,
+}
+
+impl History {
+    /// Stores the cross-check of a campaign. It replaces an earlier one.
+    ///
+    /// # Errors
+    /// `H001` if it can't be written.
+    pub fn store_cross_check(&self, check: &CrossCheck) -> Result<(), Diagnostics> {
+        let below = Below::new(self.dir());
+        let file = self.cross_check_file(&check.campaign);
+        let text = serde_json::to_string_pretty(check).unwrap_or_default();
+        let written = below
+            .create_folder(&self.dir().join(FOLDER))
+            .and_then(|()| below.write_atomic(&file, text.as_bytes()));
+        written.map_err(|error| {
+            Diagnostic::error("H001", format!("can't write {}: {error}", file.display()))
+                .help("free some space, or make the folder writable")
+                .into()
+        })
+    }
+
+    /// Returns the cross-check of a campaign, or `None` if there is none.
+    ///
+    /// # Errors
+    /// `H002` if its file is damaged.
+    pub fn cross_check(&self, campaign: &str) -> Result<Option<CrossCheck>, Diagnostics> {
+        let below = Below::new(self.dir());
+        let file = self.cross_check_file(campaign);
+        if below.kind(&file).is_none() {
+            return Ok(None);
+        }
+        let damaged = |why: String| {
+            Diagnostic::error("H002", format!("{} can't be read: {why}", file.display()))
+                .help("remove it, and give `actcheck cross-check` again")
+        };
+        let text = below
+            .read_text(&file, MOST_BYTES)
+            .map_err(|error| damaged(error.to_string()))?;
+        let check = serde_json::from_str(&text).map_err(|error| damaged(error.to_string()))?;
+        Ok(Some(check))
+    }
+
+    fn cross_check_file(&self, campaign: &str) -> PathBuf {
+        self.dir().join(FOLDER).join(format!("{campaign}.json"))
+    }
+}
