@@ -290,4 +290,50 @@ mod tests {
             [there, back].map(|table| table.difference().expect("the table has pairs"));
         assert!((there.low + back.high).abs() < 1e-12 && (there.high + back.low).abs() < 1e-12);
     }
+
+    /// Simulates campaigns of 300 pairs that are looked at after each one. Returns the share in
+    /// which a test is ever significant at 5 %, and the mean number of pairs until then.
+    fn looked_at_always(worse: f64, better: f64, campaigns: u64) -> (f64, f64) {
+        const PAIRS: u64 = 300;
+        let (mut found, mut pairs) = (0, 0);
+        // The p-value of each table is needed many times.
+        let mut known = std::collections::HashMap::new();
+        for campaign in 0..campaigns {
+            let stream = actcheck_data::Stream::new(campaign);
+            let mut seen = PairedTable::default();
+            let mut until = PAIRS;
+            for number in 1..=PAIRS {
+                let drawn = stream.unit(number);
+                match drawn {
+                    _ if drawn < worse => seen.only_first += 1,
+                    _ if drawn < worse + better => seen.only_second += 1,
+                    _ => continue,
+                }
+                let p = *known
+                    .entry((seen.only_first, seen.only_second))
+                    .or_insert_with(|| seen.test_by(Sampling::Stopped).two_sided);
+                if p <= 0.05 {
+                    (found, until) = (found + 1, number);
+                    break;
+                }
+            }
+            pairs += until;
+        }
+        (
+            f64::from(found) / campaigns as f64,
+            pairs as f64 / campaigns as f64,
+        )
+    }
+
+    /// A gate that is looked at after each pair has at most 5 % false alarms over all looks
+    /// together, and finds a regression of 20 points early.
+    #[test]
+    fn a_gate_may_be_looked_at_at_any_time() {
+        for discordant in [0.05, 0.1, 0.3] {
+            let (alarms, _) = looked_at_always(discordant / 2.0, discordant / 2.0, 10_000);
+            assert!(alarms <= 0.05, "{alarms} at {discordant}");
+        }
+        let (found, pairs) = looked_at_always(0.21, 0.01, 2_000);
+        assert!(found > 0.99 && pairs <= 60.0, "{found} after {pairs} pairs");
+    }
 }

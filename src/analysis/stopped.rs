@@ -29,7 +29,7 @@ pub enum Sampling {
 impl Sampling {
     /// From the end of a campaign in the history: a budget, or an interrupt.
     pub fn of(ended_by: Option<&str>, interrupted: bool) -> Self {
-        if interrupted || ended_by == Some("failures") {
+        if interrupted || matches!(ended_by, Some("failures" | "comparison")) {
             Self::Stopped
         } else {
             Self::Fixed

@@ -22,6 +22,8 @@ pub enum ExhaustedBudget {
     Width(f64),
     /// The number of failed runs.
     Failures(u64),
+    /// A comparison with another campaign, which is decided.
+    Comparison,
 }
 
 impl ExhaustedBudget {
@@ -31,6 +33,7 @@ impl ExhaustedBudget {
             Self::Time(_) => "time",
             Self::Width(_) => "width",
             Self::Failures(_) => "failures",
+            Self::Comparison => "comparison",
         }
     }
 }
@@ -45,6 +48,10 @@ impl fmt::Display for ExhaustedBudget {
                     "the 95 % interval of every property is at most {width} wide (--until-width)"
                 )
             }
+            Self::Comparison => write!(
+                f,
+                "the comparison with the baseline is decided (--until-decided)"
+            ),
             Self::Failures(1) => write!(f, "a run failed (--max-failures 1)"),
             Self::Failures(most) => write!(f, "{most} runs failed (--max-failures)"),
         }

@@ -71,7 +71,7 @@ pub use replay::{
 pub use restore::{MayRun, restorer};
 pub use resume::{StoredRuns, unfinished};
 pub use rule_set::RuleSet;
-pub use run_all::{CampaignOptions, resume_all, run_all};
+pub use run_all::{CampaignOptions, resume_all, resume_until, run_all};
 pub use run_cases::{CaseRun, run_cases};
 pub use schedule::{Planned, PropertyOutcome, RunResult, Schedule, Steering, schedule_of};
 pub use solids::proposed_robot;

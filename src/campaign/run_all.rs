@@ -87,6 +87,23 @@ pub fn resume_all(
     stop: &AtomicBool,
     mut on_run: impl FnMut(&RunRecord),
 ) -> CampaignResult {
+    resume_until(env, history, campaign, stored, options, stop, |record| {
+        on_run(record);
+        ControlFlow::Continue(())
+    })
+}
+
+/// As [`resume_all`]; `on_run` may end the campaign after the run that it gets, which is the same
+/// one for any number of workers.
+pub fn resume_until(
+    env: &Env,
+    history: &History,
+    campaign: &str,
+    stored: StoredRuns,
+    options: &CampaignOptions,
+    stop: &AtomicBool,
+    mut on_run: impl FnMut(&RunRecord) -> ControlFlow<ExhaustedBudget>,
+) -> CampaignResult {
     let jobs = options.jobs.max(1);
     history.use_threads(jobs);
     let halt = AtomicBool::new(false);
@@ -228,10 +245,13 @@ fn conduct(
     }
 }
 
+/// Takes each run that is in the history, and may end the campaign after it.
+type OnRun<'a> = dyn FnMut(&RunRecord) -> ControlFlow<ExhaustedBudget> + 'a;
+
 /// Writes the runs in the order of the schedule, and decides when the campaign ends.
 struct RunWriter<'a> {
     history: &'a History,
-    on_run: &'a mut dyn FnMut(&RunRecord),
+    on_run: &'a mut OnRun<'a>,
     end: CampaignResult,
     tally: Tally,
     broken: BrokenRuns,
@@ -240,7 +260,7 @@ struct RunWriter<'a> {
 }
 
 impl<'a> RunWriter<'a> {
-    fn new(env: &Env, history: &'a History, on_run: &'a mut dyn FnMut(&RunRecord)) -> Self {
+    fn new(env: &Env, history: &'a History, on_run: &'a mut OnRun<'a>) -> Self {
         let end = CampaignResult {
             ending: Ending::Finished,
             committed: 0,
@@ -273,8 +293,12 @@ impl<'a> RunWriter<'a> {
                         .iter()
                         .map(|reason| (record.index, reason.clone())),
                 );
-                (self.on_run)(&record);
+                let spent = (self.on_run)(&record).break_value();
                 self.count(RunResult::of(&record))?;
+                if let Some(spent) = spent {
+                    self.end.ending = Ending::Budget(spent);
+                    return ControlFlow::Break(());
+                }
                 match self.broken.count(&record) {
                     Some(fault) => {
                         self.stop(fault.into());

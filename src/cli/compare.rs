@@ -42,6 +42,10 @@ pub struct CompareArgs {
     /// decide); at the level of --fail-if-worse, or 0.05
     #[arg(long)]
     pub decide: bool,
+    /// Tests and intervals that are valid however often you look, as after each run of a growing
+    /// campaign; they need more scenes than those for a number that was fixed before
+    #[arg(long)]
+    pub sequential: bool,
     /// Compare also if the campaigns have different physics engines
     #[arg(long)]
     pub across_engines: bool,
@@ -68,31 +72,27 @@ pub fn compare(args: &CompareArgs) -> Result<u8, Diagnostics> {
             .help("a difference may be the engine's; `--across-engines` compares them all the same")
             .into());
     }
+    let asked = if args.sequential {
+        Sampling::Stopped
+    } else {
+        Sampling::Fixed
+    };
     let comparison = compare_runs(
         &first.runs,
         &second.runs,
-        first.sampling.and(second.sampling),
+        first.sampling.and(second.sampling).and(asked),
     );
     if comparison.pairs == 0 {
         return Err(nothing_shared(&first, &second, &comparison).into());
     }
-    let changes = changes(&first.record, &second.record)
-        .into_iter()
-        .map(|change| SideChange {
-            kind: change.kind.word().to_owned(),
-            name: change.name,
-            first: change.was,
-            second: change.is,
-        })
-        .collect();
-    let sides = [first.summary(), second.summary()];
     let summary = CompareSummary {
-        sides,
+        sides: [first.summary(), second.summary()],
         comparison,
-        changes,
+        changes: side_changes(&first, &second),
         level: args.fail_if_worse,
         margin: args.margin,
         decide: args.decide,
+        sequential: args.sequential,
     };
     output::print(&match args.format {
         Format::Text => compare_text(&summary, output::page()),
@@ -102,9 +102,22 @@ pub fn compare(args: &CompareArgs) -> Result<u8, Diagnostics> {
     Ok(summary.exit_code())
 }
 
+/// The inputs that differ between two sides.
+pub(super) fn side_changes(first: &Side, second: &Side) -> Vec<SideChange> {
+    changes(&first.record, &second.record)
+        .into_iter()
+        .map(|change| SideChange {
+            kind: change.kind.word().to_owned(),
+            name: change.name,
+            first: change.was,
+            second: change.is,
+        })
+        .collect()
+}
+
 /// The open histories. Each is opened only once, so that both sides see the same state.
 #[derive(Default)]
-struct Histories {
+pub(super) struct Histories {
     open: BTreeMap<PathBuf, History>,
 }
 
@@ -151,10 +164,10 @@ impl<'a> Name<'a> {
 }
 
 /// One side, read from its history.
-struct Side {
+pub(super) struct Side {
     name: String,
-    record: CampaignRecord,
-    runs: Vec<ComparedRun>,
+    pub(super) record: CampaignRecord,
+    pub(super) runs: Vec<ComparedRun>,
     /// Number of runs, also of those without a known scene.
     count: u64,
     /// How this number was decided.
@@ -162,7 +175,11 @@ struct Side {
 }
 
 impl Side {
-    fn read(
+    /// Reads a side by its name on the command line.
+    ///
+    /// # Errors
+    /// There is no such campaign, or the history can't be read.
+    pub(super) fn read(
         text: &str,
         default: &HistoryArgs,
         histories: &mut Histories,
@@ -206,7 +223,8 @@ impl Side {
         })
     }
 
-    fn summary(&self) -> ComparedSide {
+    /// Its description.
+    pub(super) fn summary(&self) -> ComparedSide {
         ComparedSide {
             name: self.name.clone(),
             campaign: self.record.id.clone(),

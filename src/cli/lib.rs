@@ -30,6 +30,7 @@ mod export_rdf;
 mod export_run;
 mod export_store;
 mod export_tables;
+mod gate;
 mod groups;
 mod hand_gap;
 mod health;

@@ -1,11 +1,13 @@
 //! `actcheck run`
 
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use indicatif::ProgressBar;
 
+use crate::gate::Gate;
 use crate::live_failures::LiveFailures;
 use crate::options::Format;
 use crate::progress::Progress;
@@ -18,14 +20,14 @@ use actcheck_analysis::{Interval, Mirror, Sampling};
 use actcheck_base::{Diagnostic, Diagnostics, Outcome};
 use actcheck_campaign::{
     CampaignOptions, CampaignResult, Ending, Env, ExhaustedBudget, RunContext, StoredRuns,
-    WeightedRate, resume_all,
+    WeightedRate, resume_until,
 };
 use actcheck_history as history;
 use actcheck_history::{History, RunFilter, RunRecord, RunRow, newest_of_alike};
 use actcheck_report::{
     CampaignSummary, EndedBy, GuidedSearch, HealthSummary, RunSummary, WeightedLine, campaign_json,
-    campaign_result_text, campaign_table, campaign_text, health_json, health_lines, shrunk_json,
-    shrunk_text, with_shrunk,
+    campaign_result_text, campaign_table, campaign_text, compare_text, health_json, health_lines,
+    shrunk_json, shrunk_text, with_shrunk,
 };
 use actcheck_rules::Budget;
 use actcheck_verdict::{Counts, mean};
@@ -76,6 +78,7 @@ pub(super) fn campaign(
         _ => Progress::new(planned, session.env.campaign.limits.time_secs),
     };
     on_bar(progress.bar());
+    let mut gate = Gate::open(args, &session.env, &session.history, &session.id)?;
     session.begin((clock.now)())?;
     let options = CampaignOptions {
         jobs,
@@ -88,7 +91,8 @@ pub(super) fn campaign(
     runs.iter().for_each(|run| progress.run(run));
     let mut failures = LiveFailures::new(&session.env, &session.id, verbosity);
     let mut mirrored = runs.len();
-    let (end, faults) = make_runs(&session, &options, stop, |record| {
+    let mut gate_faults = Diagnostics::new();
+    let (end, mut faults) = make_runs(&session, &options, stop, |record| {
         let summary = RunSummary::of(record);
         if let Some(text) = failures.text(&summary) {
             progress.tell(&text);
@@ -99,8 +103,17 @@ pub(super) fn campaign(
             mirror(&session.history);
             mirrored = runs.len();
         }
+        match gate.as_mut().map_or(Ok(false), Gate::decides) {
+            Ok(true) => ControlFlow::Break(ExhaustedBudget::Comparison),
+            Ok(false) => ControlFlow::Continue(()),
+            Err(found) => {
+                gate_faults = found;
+                ControlFlow::Break(ExhaustedBudget::Comparison)
+            }
+        }
     });
     progress.finish();
+    faults.extend(gate_faults);
     if failures.any() && args.format == Format::Text {
         output::print_error_text("\n");
     }
@@ -145,7 +158,23 @@ pub(super) fn campaign(
     }
     let interrupted = shrinks && stop.load(Ordering::Relaxed);
     let code = exit_code(end.ending, faults, &summary)?;
-    finished.map(|()| if interrupted { stop::INTERRUPTED } else { code })
+    finished?;
+    if interrupted {
+        return Ok(stop::INTERRUPTED);
+    }
+    match gate {
+        Some(gate) if code != stop::INTERRUPTED => compared(&gate, args.format),
+        _ => Ok(code),
+    }
+}
+
+/// Prints the comparison with the baseline. Returns the exit code: 1 if this campaign is worse.
+fn compared(gate: &Gate, format: Format) -> Result<u8, Diagnostics> {
+    let summary = gate.summary()?;
+    if format == Format::Text {
+        output::print(&format!("\n{}", compare_text(&summary, output::page())));
+    }
+    Ok(summary.exit_code())
 }
 
 /// Makes the runs of a campaign, or those of `--last-failed`. Returns also the faults of runs that
@@ -154,7 +183,7 @@ fn make_runs(
     session: &Session,
     options: &CampaignOptions,
     stop: &AtomicBool,
-    mut on_run: impl FnMut(&RunRecord),
+    mut on_run: impl FnMut(&RunRecord) -> ControlFlow<ExhaustedBudget>,
 ) -> (CampaignResult, Diagnostics) {
     let Session {
         env,
@@ -165,11 +194,14 @@ fn make_runs(
         ..
     } = session;
     quietly(|| match failed {
-        Some(failed) => failed.run((env, history, id), options, stop, &mut on_run),
+        Some(failed) => failed.run((env, history, id), options, stop, |record| {
+            // These have no budget and no baseline.
+            _ = on_run(record);
+        }),
         None => {
             let stored = StoredRuns::of(kept);
             (
-                resume_all(env, history, id, stored, options, stop, &mut on_run),
+                resume_until(env, history, id, stored, options, stop, &mut on_run),
                 Diagnostics::new(),
             )
         }

@@ -43,6 +43,14 @@ pub struct RunArgs {
     /// End at the N-th failed run, which is the same for any number of workers
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub max_failures: Option<u64>,
+    /// Compare with this campaign, named as in `actcheck compare`, and print the comparison; the
+    /// exit code is then 1 if this campaign is worse at level 0.05, however often it was looked at
+    #[arg(long, value_name = "BASE", conflicts_with_all = ["last_failed", "shard"])]
+    pub against: Option<String>,
+    /// End when the comparison is decided: worse, better, or no difference of 5 points. It is
+    /// looked at after every run
+    #[arg(long, requires = "against")]
+    pub until_decided: bool,
     /// Seed of all randomness, instead of the configuration's `seed`
     #[arg(long, value_name = "S")]
     pub seed: Option<u64>,

@@ -110,11 +110,7 @@ fn marked(episode: &Episode) -> Vec<Span> {
         let end = next.filter(|next| !next.begins && next.action == begin.action);
         spans.push(Span {
             action: begin.action.clone(),
-            parameters: begin
-                .parameters
-                .iter()
-                .map(|(name, value)| (name.clone(), vec![value.clone()]))
-                .collect(),
+            parameters: begin.parameters.clone(),
             states: Some([index(begin.time_secs), to]),
             report: end.and_then(|end| Some((end.reported?, end.message.clone()))),
         });

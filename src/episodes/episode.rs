@@ -171,7 +171,7 @@ pub struct Mark {
     /// Whether the action begins; otherwise it ends.
     pub begins: bool,
     /// Values of the designators, given where it begins.
-    pub parameters: BTreeMap<String, String>,
+    pub parameters: BTreeMap<String, Vec<String>>,
     /// The action's own report, given where it ends.
     pub reported: Option<bool>,
     /// The report's words.

@@ -276,7 +276,11 @@ impl Reader {
                     time_secs: 0.0,
                     action: mark.action,
                     begins: mark.event == "begin",
-                    parameters: mark.parameters,
+                    parameters: mark
+                        .parameters
+                        .into_iter()
+                        .map(|(name, values)| (name, values.list()))
+                        .collect(),
                     reported: mark.reported,
                     message: mark.message.unwrap_or_default(),
                 };

@@ -203,6 +203,11 @@ impl Quantity {
 }
 
 impl Lacks {
+    /// Removes a quantity that is known after all.
+    pub fn remove(&mut self, quantity: Quantity) {
+        self.quantities.remove(&quantity);
+    }
+
     /// Notes that a quantity is missing, and with it those that are measured by it.
     pub fn add(&mut self, quantity: Quantity) {
         self.quantities.insert(quantity);

@@ -158,7 +158,25 @@ pub(crate) struct MarkMessage {
     pub(crate) action: String,
     pub(crate) event: String,
     #[serde(default)]
-    pub(crate) parameters: std::collections::BTreeMap<String, String>,
+    pub(crate) parameters: std::collections::BTreeMap<String, Values>,
     pub(crate) reported: Option<bool>,
     pub(crate) message: Option<String>,
+}
+
+/// The value of a designator, or several.
+#[derive(Debug, Deserialize)]
+#[serde(untagged)]
+pub(crate) enum Values {
+    One(String),
+    Several(Vec<String>),
+}
+
+impl Values {
+    /// The values as a list.
+    pub(crate) fn list(self) -> Vec<String> {
+        match self {
+            Self::One(value) => vec![value],
+            Self::Several(values) => values,
+        }
+    }
 }

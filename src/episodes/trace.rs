@@ -113,6 +113,8 @@ fn performed(
 /// The quantities that the trace of an episode lacks.
 fn lacks(watched: &Watched<'_>, spans: &[Span]) -> Lacks {
     let mut lacks = watched.episode.lacks.clone();
+    // Marks may have reports where the environment states no success.
+    lacks.remove(Quantity::Report);
     let cast = watched.cast;
     let mut miss = |quantity: Quantity, is_missing: bool| {
         if is_missing {

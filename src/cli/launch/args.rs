@@ -114,6 +114,8 @@ impl LaunchArgs {
             time: None,
             until_width: None,
             max_failures: None,
+            against: None,
+            until_decided: false,
             seed,
             strategy: None,
             repeat: None,

@@ -50,6 +50,8 @@ pub struct CompareSummary {
     pub margin: f64,
     /// Whether the exit code is the answer.
     pub decide: bool,
+    /// Whether tests that are valid at any look were asked for.
+    pub sequential: bool,
 }
 
 /// Significance level of the answer if none was given.

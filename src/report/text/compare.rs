@@ -154,11 +154,36 @@ fn lines(out: &mut String, summary: &CompareSummary, page: Page) {
         Sampling::Fixed => format!(
             "p: McNemar's exact test, two-sided; corrected: for {lines} lines, by Holm. [95 %]: Tango's score interval"
         ),
+        Sampling::Stopped if summary.sequential => sequential(summary, lines),
         Sampling::Stopped => format!(
             "outcomes ended one of the campaigns, so p and [95 %] are valid whenever runs end; corrected: for {lines} lines, by Holm"
         ),
     };
     let _ = writeln!(out, "{table}\n{how}");
+}
+
+/// How p and intervals at any look are made, and how much weaker they are than those for a fixed
+/// number of scenes.
+fn sequential(summary: &CompareSummary, lines: usize) -> String {
+    let how = format!(
+        "p and [95 %] are valid however often you look: p is the inverse of an e-value of the scenes that only one side passes; \
+         corrected: for {lines} lines, by Holm"
+    );
+    let strongest = summary
+        .comparison
+        .lines
+        .iter()
+        .min_by(|a, b| a.test.two_sided.total_cmp(&b.test.two_sided));
+    let Some(line) = strongest else {
+        return how;
+    };
+    format!(
+        "{how}. That costs power: for {} scenes that were fixed before, p of `{}` would be {} instead of {}",
+        line.table.pairs(),
+        compared_name(&line.of),
+        probability(line.table.test().two_sided),
+        probability(line.test.two_sided)
+    )
 }
 
 fn difference(line: &ComparedLine) -> String {

@@ -137,7 +137,7 @@ def play(run: Run, change: Callable[[Any, Run], None], to: Path) -> float:
                 recorder.mark(action["action"], "end", reported=reported, message=action["message"])
             if tick in begins and tick < len(run.position):
                 action = begins[tick]
-                recorder.mark(action["action"], "begin", **{name: ", ".join(values) for name, values in action["parameters"].items()})
+                recorder.mark(action["action"], "begin", **action["parameters"])
             if tick == len(run.position):
                 break
             for step in range(steps):

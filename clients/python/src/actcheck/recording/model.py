@@ -204,7 +204,7 @@ MARK_SCHEMA: dict[str, Any] = {
     {
         "action": _TEXT,
         "event": {"enum": ["begin", "end"]},
-        "parameters": {"type": "object", "additionalProperties": _TEXT},
+        "parameters": {"type": "object", "additionalProperties": {"anyOf": [_TEXT, {"type": "array", "items": _TEXT}]}},
         "reported": _maybe(_FLAG) | {"description": "whether the robot reported success; only at the end"},
         "message": _maybe(_TEXT),
     }

@@ -179,9 +179,9 @@ class Recorder:
         *,
         reported: bool | None = None,
         message: str | None = None,
-        **parameters: str,
+        **parameters: str | list[str],
     ) -> None:
-        """Records that an action was begun or ended, such as `mark("Pick", "begin", pickObject="cube")`.
+        """Records that an action was begun or ended, such as `mark("Pick", "begin", pickObject="cube")`. A designator may have several values.
 
         `reported` and `message` are the robot's own report at the end. The mark belongs to the last recorded state; before the first
         step, to the state before anybody acts.
@@ -191,7 +191,8 @@ class Recorder:
         self.before_step()
         assert self._episode is not None
         self._episode.write()
-        content = {"action": action, "event": event, "parameters": {key: str(value) for key, value in parameters.items()}}
+        values = {key: [str(one) for one in value] if isinstance(value, list) else str(value) for key, value in parameters.items()}
+        content = {"action": action, "event": event, "parameters": values}
         self._episode.file.mark(self._episode.time, content | {"reported": reported, "message": message})
 
     def end_episode(self) -> None:
