@@ -112,7 +112,7 @@ pub fn perform_with(
             (actions[last].end, actions[last].report) = (ended_by(fault), None);
         }
     }
-    let tracks = world.tracks();
+    let tracks = world.recorder().tracks();
     let frames = Frames {
         period_secs: tracks.period_secs,
         names: tracks.names,
@@ -127,7 +127,7 @@ pub fn perform_with(
         snapshots,
         actions,
         frames,
-        hash: world.state_digest(),
+        hash: world.recorder().state_digest(),
         map: SceneMap::default(),
         forms,
         robot_courses,

@@ -357,7 +357,7 @@ fn perform(
             map: scene.map.clone(),
             ..trace
         },
-        Some(world.quality()),
+        Some(world.recorder().quality()),
     ))
 }
 

@@ -88,9 +88,7 @@ mod tests {
     use crate::robot::tests::lonely;
     use crate::simulation::tests::bodies_mut;
     use actcheck_data::{Choices, ObjectModel, Part, Pose, Role, SceneObject, Shape};
-    use actcheck_geometry::to_pose;
     use nalgebra::{Isometry3, Vector3};
-    use rapier3d::prelude::{ColliderBuilder, SharedShape};
     use std::sync::Arc;
 
     /// A box of 10 cm, half a metre aside of the origin of its body, as a drawer may be.

@@ -6,8 +6,6 @@
 //! never too fast, without jumps, and never deep in another body. Such an object stays where it
 //! left, and the run goes on. Everything else that leaves is a fault.
 
-use std::collections::BTreeMap;
-
 use nalgebra::Vector3;
 use rapier3d::prelude::RigidBodyType;
 

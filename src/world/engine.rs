@@ -88,6 +88,12 @@ impl Engine {
         })
     }
 
+    /// Sets the substeps in each step of the whole robot.
+    #[cfg(test)]
+    pub(super) fn set_substeps(&mut self, substeps: usize) {
+        self.substeps = substeps;
+    }
+
     /// Returns the bodies.
     pub(super) fn bodies(&self) -> &Bodies {
         &self.bodies

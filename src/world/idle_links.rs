@@ -55,13 +55,14 @@ mod tests {
     use rapier3d::prelude::RigidBodyHandle;
 
     use super::*;
+    use crate::World;
     use crate::robot::tests::{alone, lonely};
     use crate::simulation::tests::{bodies, bodies_mut, step_with};
     use actcheck_geometry::from_pose;
 
     /// The shipped robot with a forearm of many pieces.
     fn with_pieces() -> World {
-        let profile = lonely().robot.profile.as_ref().clone();
+        let profile = bodies(&lonely()).robot.profile.as_ref().clone();
         let link = "<link name=\"wrist_flex_link\">";
         assert!(profile.urdf.text.contains(link));
         let piece =

@@ -29,67 +29,67 @@ impl MotionMeter {
             Some(told) => told.clone_from(command),
             None => self.told = Some(command.clone()),
         }
+    }
 
-        /// Starts a new recording, with a command to hold the current state.
-        pub(super) fn begin(&mut self, engine: &Engine, drive: &Drive, secs: f64) {
-            self.rows.clear();
-            self.told = Some(drive.hold(engine));
-            self.record(engine, drive, secs);
-        }
+    /// Starts a new recording, with a command to hold the current state.
+    pub(super) fn begin(&mut self, engine: &Engine, drive: &Drive, secs: f64) {
+        self.rows.clear();
+        self.told = Some(drive.hold(engine));
+        self.record(engine, drive, secs);
+    }
 
-        /// Records this moment, at a time since the record began. Unit: seconds.
-        pub(super) fn record(&mut self, engine: &Engine, drive: &Drive, secs: f64) {
-            let Some(told) = &self.told else {
-                return;
-            };
-            let observed = drive.observe(engine);
-            let bodies = engine.bodies();
-            let base = bodies.base_true();
-            let mut row = vec![grain(secs, GRAIN), grain(observed.gripper_opening_m, GRAIN)];
-            row.extend(
-                observed
-                    .finger_efforts_n
-                    .map(|effort| grain(effort, EFFORT_GRAIN)),
-            );
+    /// Records this moment, at a time since the record began. Unit: seconds.
+    pub(super) fn record(&mut self, engine: &Engine, drive: &Drive, secs: f64) {
+        let Some(told) = &self.told else {
+            return;
+        };
+        let observed = drive.observe(engine);
+        let bodies = engine.bodies();
+        let base = bodies.base_true();
+        let mut row = vec![grain(secs, GRAIN), grain(observed.gripper_opening_m, GRAIN)];
+        row.extend(
+            observed
+                .finger_efforts_n
+                .map(|effort| grain(effort, EFFORT_GRAIN)),
+        );
+        row.extend([
+            grain(told.gripper_opening_m, GRAIN),
+            grain(told.grip_force_n, EFFORT_GRAIN),
+        ]);
+        row.extend(
+            base.into_iter()
+                .chain(drive.believed(base))
+                .map(|value| grain(value, GRAIN)),
+        );
+        let gripper = &bodies.robot.layout.gripper;
+        for (idx, position) in observed.positions.iter().enumerate() {
+            let of = |values: &[f64]| values.get(idx).copied().unwrap_or(f64::NAN);
+            let velocity = of(&observed.velocities);
+            // The gap between the fingers is commanded, not their positions.
+            let target = gripper
+                .target(idx, told.gripper_opening_m)
+                .unwrap_or_else(|| of(&told.positions));
+            row.extend([*position, velocity].map(|value| grain(value, GRAIN)));
             row.extend([
-                grain(told.gripper_opening_m, GRAIN),
-                grain(told.grip_force_n, EFFORT_GRAIN),
+                grain(of(&observed.loads), EFFORT_GRAIN),
+                grain(target, GRAIN),
             ]);
-            row.extend(
-                base.into_iter()
-                    .chain(drive.believed(base))
-                    .map(|value| grain(value, GRAIN)),
-            );
-            let gripper = &bodies.robot.layout.gripper;
-            for (idx, position) in observed.positions.iter().enumerate() {
-                let of = |values: &[f64]| values.get(idx).copied().unwrap_or(f64::NAN);
-                let velocity = of(&observed.velocities);
-                // The gap between the fingers is commanded, not their positions.
-                let target = gripper
-                    .target(idx, told.gripper_opening_m)
-                    .unwrap_or_else(|| of(&told.positions));
-                row.extend([*position, velocity].map(|value| grain(value, GRAIN)));
-                row.extend([
-                    grain(of(&observed.loads), EFFORT_GRAIN),
-                    grain(target, GRAIN),
-                ]);
-            }
-            self.rows.push(row);
         }
+        self.rows.push(row);
+    }
 
-        /// Returns the motion recorded since the start.
-        pub(super) fn end(&mut self, bodies: &Bodies) -> Motion {
-            let joints = bodies
-                .robot
-                .model
-                .joints
-                .iter()
-                .map(|joint| joint.name.clone())
-                .collect();
-            Motion {
-                joints,
-                rows: std::mem::take(&mut self.rows),
-            }
+    /// Returns the motion recorded since the start.
+    pub(super) fn end(&mut self, bodies: &Bodies) -> Motion {
+        let joints = bodies
+            .robot
+            .model
+            .joints
+            .iter()
+            .map(|joint| joint.name.clone())
+            .collect();
+        Motion {
+            joints,
+            rows: std::mem::take(&mut self.rows),
         }
     }
 }

@@ -18,7 +18,6 @@ use crate::object::Object;
 use crate::reach::{Reach, Shortcuts};
 use crate::spans::spans;
 use actcheck_geometry::Ball;
-use actcheck_geometry::{from_pose, from_vector};
 use actcheck_robot::JointKind;
 use actcheck_robot::{GRAVITY, axis_in_world};
 

@@ -60,7 +60,7 @@ pub struct Course {
     pub max_displacement_m: f64,
 }
 
-/// The data recorded since [`World::begin_record`].
+/// The data recorded since [`World::begin_record`](crate::World::begin_record).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
     /// Contacts, sorted by start and pair.

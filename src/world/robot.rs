@@ -412,6 +412,7 @@ pub(super) mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::bodies::Bodies;
     use crate::gripper_tests::checked;
     use crate::simulation::tests::{bodies, bodies_mut, tick};
     use crate::{World, build, ik};
@@ -574,7 +575,7 @@ pub(super) mod tests {
     #[test]
     fn joints_with_strong_friction_keep_up_with_their_targets() {
         let with_friction = |damping: f64| {
-            let profile = lonely().robot.profile.as_ref().clone();
+            let profile = bodies(&lonely()).robot.profile.as_ref().clone();
             let limit = r#"effort="50" velocity="1.5"/>"#;
             let (before, after) = profile
                 .urdf
@@ -637,7 +638,7 @@ pub(super) mod tests {
 
     #[test]
     fn a_profile_that_names_a_missing_joint_is_refused_with_help() {
-        let mut profile = lonely().robot.profile.as_ref().clone();
+        let mut profile = bodies(&lonely()).robot.profile.as_ref().clone();
         profile.arm_joints[1] = "arm_flx_joint".to_owned();
         let refused = checked(&profile)
             .expect_err("the joint is missing")

@@ -7,7 +7,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use crate::bodies::Bodies;
 use crate::drive::Drive;
 use crate::object::Object;
-use actcheck_data::{ChoiceName, Choices, PlanarAxis, Pose, SightingAxis};
+use actcheck_data::{ChoiceName, Choices, Pose, SightingAxis};
 
 /// Tilt beyond which an object counts as lying: it is then seen as its upright bounding box. Unit:
 /// radians.

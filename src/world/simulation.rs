@@ -230,6 +230,12 @@ impl World {
         sense::truth(self.engine.bodies())
     }
 
+    /// Returns the ids of all objects, in scene order.
+    pub fn visible(&self) -> Vec<String> {
+        let objects = self.engine.bodies().objects.iter();
+        objects.map(|object| object.id.clone()).collect()
+    }
+
     /// Returns the furniture of the floor plan, without noise; it is off only by the error of the
     /// robot's pose estimate. Static objects that are not on the map must be perceived.
     pub fn known_furniture(&self) -> Vec<Sighting> {
@@ -330,6 +336,11 @@ pub(super) mod tests {
 
     pub(crate) fn bodies_mut(world: &mut World) -> &mut Bodies {
         world.engine.bodies_mut()
+    }
+
+    /// Sets the substeps in each step of the whole robot.
+    pub(crate) fn set_substeps(world: &mut World, substeps: usize) {
+        world.engine.set_substeps(substeps);
     }
 
     /// Performs one control tick with the previous command.
