@@ -120,7 +120,10 @@ impl Ours {
             self.world.step(&self.command);
         }
         assert!(self.world.fault().is_none(), "the scene must stay sound");
-        (now_secs() - start, self.world.engine().engine_secs() - engine_start)
+        (
+            now_secs() - start,
+            self.world.engine().engine_secs() - engine_start,
+        )
     }
 }
 

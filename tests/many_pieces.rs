@@ -263,7 +263,11 @@ fn links_that_are_hardly_apart_leave_only_their_motion_to_the_engine() {
     let mut command = world.hold();
     (0..30).for_each(|_| world.step(&command));
     let [free, .., whole] = world.proximity().ticks_by_reach();
-    assert!(free > 0 && whole == 0, "{:?}", world.proximity().ticks_by_reach());
+    assert!(
+        free > 0 && whole == 0,
+        "{:?}",
+        world.proximity().ticks_by_reach()
+    );
     let roll = world
         .layout()
         .arm

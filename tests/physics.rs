@@ -728,7 +728,10 @@ fn a_bottle_that_rolls_on_its_rim_gains_little_energy() {
         run(&mut world, 3.0);
         world.recorder().quality().energy_gain_j
     };
-    let (usual, in_engine) = (gain_j(|_| {}), gain_j(|world| world.take_shortcuts(Shortcuts::NONE)));
+    let (usual, in_engine) = (
+        gain_j(|_| {}),
+        gain_j(|world| world.take_shortcuts(Shortcuts::NONE)),
+    );
     assert!(usual < 0.02, "{usual} J");
     assert!(
         (usual - in_engine).abs() < 1e-6,

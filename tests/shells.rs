@@ -180,7 +180,10 @@ fn things_fall_into_a_closed_glass_and_it_opens_before() {
             cube[2] < 0.06 && cube[0].hypot(cube[1]) < 0.04,
             "the cube is at {cube:?}"
         );
-        assert!(!world.engine().is_closed("thing_1"), "with something inside");
+        assert!(
+            !world.engine().is_closed("thing_1"),
+            "with something inside"
+        );
     }
 }
 

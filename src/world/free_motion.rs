@@ -271,16 +271,16 @@ mod tests {
     use actcheck_data::Choices;
 
     fn dynamics(world: &World) -> (Vec<f64>, Inertias) {
-        let (positions, velocities) = bodies(&world).robot.state();
-        let poses = bodies(&world).robot.kinematics.links(&positions);
-        let armatures = bodies(&world)
+        let (positions, velocities) = bodies(world).robot.state();
+        let poses = bodies(world).robot.kinematics.links(&positions);
+        let armatures = bodies(world)
             .robot
             .motors
             .iter()
             .map(|motor| motor.armature);
         (
             positions,
-            inertias(&bodies(&world).robot.model, &poses, &velocities).with_rotors(armatures),
+            inertias(&bodies(world).robot.model, &poses, &velocities).with_rotors(armatures),
         )
     }
 

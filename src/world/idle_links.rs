@@ -75,15 +75,15 @@ mod tests {
     /// Returns the names of the links whose shapes are in the search.
     fn searched(world: &World) -> BTreeSet<String> {
         let is_searched = |body: RigidBodyHandle| {
-            let mut colliders = bodies(&world).physics.bodies[body].colliders().iter();
-            colliders.any(|handle| bodies(&world).physics.colliders[*handle].is_enabled())
+            let mut colliders = bodies(world).physics.bodies[body].colliders().iter();
+            colliders.any(|handle| bodies(world).physics.colliders[*handle].is_enabled())
         };
-        let links = bodies(&world)
+        let links = bodies(world)
             .robot
             .model
             .links
             .iter()
-            .zip(&bodies(&world).robot.bodies);
+            .zip(&bodies(world).robot.bodies);
         let searched = links.filter(|(_, body)| is_searched(**body));
         searched.map(|(link, _)| link.name.clone()).collect()
     }

@@ -4,7 +4,6 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use crate::bodies::Bodies;
 use crate::fault::{Perturbation, Poison};
-use actcheck_data::Pose;
 use actcheck_geometry::{to_pose, to_real, to_vector};
 
 /// Gap below an object that is laid down, so that it drops into contact instead of being pushed
@@ -75,6 +74,7 @@ fn lying(standing: &Isometry3<f64>, [width, _, height]: [f64; 3]) -> Isometry3<f
 #[cfg(test)]
 mod tests {
     use super::*;
+    use actcheck_data::Pose;
 
     #[test]
     fn a_fallen_object_lies_above_its_former_position() {
