@@ -20,8 +20,9 @@ use actcheck_scenario::FloorPlan;
 /// limit speeds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Command {
-    /// Target position of each joint, in the order of [`Kinematics::joints`]; for the base, by its
-    /// own belief. Finger joints follow `gripper_opening_m` instead. Units: metres or radians.
+    /// Target position of each joint, in the order of
+    /// [`Kinematics::joints`](crate::Kinematics::joints); for the base, by its own belief. Finger
+    /// joints follow `gripper_opening_m` instead. Units: metres or radians.
     pub positions: Vec<f64>,
     /// Gap between the fingers; 0 switches the vacuum of a suction cup on. Unit: metres.
     pub gripper_opening_m: f64,
