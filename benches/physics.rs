@@ -92,7 +92,7 @@ impl Ours {
     fn new(scene: &Scene) -> Self {
         let mut world = world::build(scene).expect("a sound scene");
         // Both do the same work: free motion of the robot would take fewer steps of the engine.
-        world.leave_to_engine();
+        world.take_shortcuts(world::Shortcuts::NONE);
         world.watch(now_secs);
         let command = world.hold();
         let steps_per_tick =
@@ -115,12 +115,15 @@ impl Ours {
 
     /// Wall time of the steps, and of the engine within them. Unit: seconds.
     fn measure(&mut self) -> (f64, f64) {
-        let (start, engine_start) = (now_secs(), self.world.engine_secs());
+        let (start, engine_start) = (now_secs(), self.world.engine().engine_secs());
         for _ in 0..self.ticks {
             self.world.step(&self.command);
         }
         assert!(self.world.fault().is_none(), "the scene must stay sound");
-        (now_secs() - start, self.world.engine_secs() - engine_start)
+        (
+            now_secs() - start,
+            self.world.engine().engine_secs() - engine_start,
+        )
     }
 }
 

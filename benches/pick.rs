@@ -143,7 +143,7 @@ fn by_stage(env: &Env, index: u64, costs: &mut Costs) -> Option<f64> {
     let trace = costs.time("simulation", || {
         actions::perform(&calls, &mut built, &mut choices, &env.campaign.budget)
     });
-    costs.engine_secs += built.engine_secs();
+    costs.engine_secs += built.engine().engine_secs();
     let run_facts = costs.time("facts", || facts::extract(&trace));
     let properties = &env.ontology.actions["Pick"].success_properties;
     let seen = run_facts.action(0)?;

@@ -168,7 +168,7 @@ fn one_run(env: &Env, index: u64, costs: &mut Costs) -> Option<f64> {
     let start = wall_secs();
     let trace = actions::perform(&calls, &mut built, &mut choices, &env.campaign.budget);
     let performed = wall_secs() - start;
-    let (engine, pictures) = (built.engine_secs(), built.camera_secs());
+    let (engine, pictures) = (built.engine().engine_secs(), built.engine().camera_secs());
     costs.add("actions: physics", engine);
     costs.add("actions: camera images", pictures);
     costs.add(

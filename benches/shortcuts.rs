@@ -206,10 +206,14 @@ fn simulate(env: &Env, index: u64, shortcuts: Shortcuts, first: bool, found: &mu
             .iter()
             .map(|action| action.report.as_ref().map(|report| report.succeeded));
         found.reports.push(reports.collect());
-        let quality = built.quality();
+        let quality = built.recorder().quality();
         found.penetration_m = found.penetration_m.max(quality.deepest_penetration_m);
         found.energy_j = found.energy_j.max(quality.energy_gain_j);
-        for (total, ticks) in found.ticks.iter_mut().zip(built.ticks_by_reach()) {
+        for (total, ticks) in found
+            .ticks
+            .iter_mut()
+            .zip(built.proximity().ticks_by_reach())
+        {
             *total += ticks;
         }
         found.holds.extend(hold(&mut built));

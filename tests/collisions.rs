@@ -1,7 +1,7 @@
 //! The robot against furniture and against itself, and the limits of its motors.
 
 use actcheck::data::{Pose, Role};
-use actcheck::world::{Contact, GRAVITY, Poison, World, build};
+use actcheck::world::{Contact, GRAVITY, Poison, Shortcuts, World, build};
 
 use crate::physics::{block, object, scene};
 
@@ -65,7 +65,7 @@ fn pushed_furniture_slides_and_resists_with_its_friction() {
         y.abs() < 0.05 && z.abs() < 1e-3,
         "it slides on the floor: {y} {z}"
     );
-    let tracks = world.tracks();
+    let tracks = world.recorder().tracks();
     assert!(
         tracks.names.contains(&"block_1".to_owned()),
         "furniture that moved has a track"
@@ -312,7 +312,7 @@ fn hit(mut world: World) -> (bool, Contact, [f64; 3]) {
     let mut moved_freely = false;
     for _ in 0..4 {
         drive(&mut world, 0.15, 0.2);
-        moved_freely |= world.moved_freely();
+        moved_freely |= world.proximity().moved_freely();
     }
     let place = place_of(&world);
     let contacts = world.end_record().contacts;
@@ -326,7 +326,7 @@ fn hit(mut world: World) -> (bool, Contact, [f64; 3]) {
 fn motion_without_the_engine_ends_before_the_first_contact() {
     let fresh = || before_furniture(14.0, 0.5);
     let mut left = fresh();
-    left.leave_to_engine();
+    left.take_shortcuts(Shortcuts::NONE);
     let (freely, contact, place) = hit(fresh());
     let (never, expected, engine_place) = hit(left);
     assert!(freely && !never);

@@ -73,7 +73,7 @@ fn fingers_of_many_pieces_hold_like_those_of_one() {
         (
             body(&world, "thing_1").pose.position[2],
             slip,
-            world.quality().deepest_penetration_m,
+            world.recorder().quality().deepest_penetration_m,
         )
     });
     assert!((whole.0 - pieces.0).abs() < 2e-3, "{whole:?} {pieces:?}");
@@ -120,7 +120,7 @@ fn a_fast_object_does_not_enter_fingers_of_many_pieces_deeper() {
         let hold = world.hold();
         world.begin_record();
         (0..90).for_each(|_| world.step(&hold));
-        let depth_m = world.quality().deepest_penetration_m;
+        let depth_m = world.recorder().quality().deepest_penetration_m;
         let contacts = world.end_record().contacts;
         let is_of_robot =
             |pair: &[String; 2]| pair[0].starts_with("robot/") && pair[1] == "thing_1";
@@ -166,7 +166,7 @@ fn a_falling_object_does_not_enter_an_arm_of_many_pieces_deeper() {
             build(&if pieces { with_pieces(scene) } else { scene }).expect("the scene is right");
         let command = stretched(&world);
         (0..300).for_each(|_| world.step(&command));
-        assert!(world.moved_freely());
+        assert!(world.proximity().moved_freely());
         let joints = world.kinematics().joints();
         let wrist = joints
             .iter()
@@ -179,7 +179,7 @@ fn a_falling_object_does_not_enter_an_arm_of_many_pieces_deeper() {
         assert!(world.poison("thing_1", Poison::Teleport(above.into())));
         world.begin_record();
         (0..90).for_each(|_| world.step(&command));
-        let depth_m = world.quality().deepest_penetration_m;
+        let depth_m = world.recorder().quality().deepest_penetration_m;
         let contacts = world.end_record().contacts;
         let is_of_arm =
             |pair: &[String; 2]| pair[0].starts_with("robot/arm_") && pair[1] == "thing_1";
@@ -218,7 +218,7 @@ fn only_fast_things_are_swept_beside_fingers_of_many_pieces() {
         let mut n_swept = 0;
         for _ in 0..ticks {
             world.step(&hold);
-            n_swept += u32::from(world.swept());
+            n_swept += u32::from(world.engine().swept());
         }
         assert_eq!(world.fault(), None);
         let height = body(&world, "plate_1").pose.position[2];
@@ -262,8 +262,12 @@ fn links_that_are_hardly_apart_leave_only_their_motion_to_the_engine() {
     assert!(world.settle().settled);
     let mut command = world.hold();
     (0..30).for_each(|_| world.step(&command));
-    let [free, .., whole] = world.ticks_by_reach();
-    assert!(free > 0 && whole == 0, "{:?}", world.ticks_by_reach());
+    let [free, .., whole] = world.proximity().ticks_by_reach();
+    assert!(
+        free > 0 && whole == 0,
+        "{:?}",
+        world.proximity().ticks_by_reach()
+    );
     let roll = world
         .layout()
         .arm
@@ -275,9 +279,9 @@ fn links_that_are_hardly_apart_leave_only_their_motion_to_the_engine() {
     (0..60).for_each(|_| world.step(&command));
     let turned = world.observe().positions[roll] - before;
     assert!(
-        turned < 0.1 && world.ticks_by_reach()[3] > 0,
+        turned < 0.1 && world.proximity().ticks_by_reach()[3] > 0,
         "turned by {turned} rad: {:?}",
-        world.ticks_by_reach()
+        world.proximity().ticks_by_reach()
     );
 }
 
@@ -295,11 +299,11 @@ fn the_root_of_a_fixed_robot_may_touch_things() {
         let pan = world.layout().arm[0];
         command.positions[pan] += 0.2;
         (0..60).for_each(|_| world.step(&command));
-        let [free, .., whole] = world.ticks_by_reach();
+        let [free, .., whole] = world.proximity().ticks_by_reach();
         assert!(
             free > 0 && whole == 0,
             "{beside_m} m: {:?}",
-            world.ticks_by_reach()
+            world.proximity().ticks_by_reach()
         );
         assert!((world.observe().positions[pan] - command.positions[pan]).abs() < 0.01);
     }
@@ -365,12 +369,12 @@ fn a_light_arm_sinks_under_the_object_in_its_hand() {
                 let mut hold = world.hold();
                 hold.gripper_opening_m = 0.0;
                 (0..120).for_each(|_| world.step(&hold));
-                assert!(!world.moved_hand_alone());
+                assert!(!world.proximity().moved_hand_alone());
                 let hand = world.snapshot().robot.gripper.position[2];
                 (
                     hand,
                     in_hand(&world).translation.z,
-                    world.quality().deepest_penetration_m,
+                    world.recorder().quality().deepest_penetration_m,
                 )
             });
         assert!(

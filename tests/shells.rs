@@ -52,7 +52,7 @@ fn a_glass_at_rest_is_closed_and_in_the_pose_of_an_open_one() {
             );
             assert!(world.settle().settled);
             assert_eq!(
-                world.is_closed("thing_1"),
+                world.engine().is_closed("thing_1"),
                 shortcuts == Shortcuts::ALL,
                 "{name}"
             );
@@ -82,7 +82,7 @@ fn bowls_and_plates_stay_open() {
             Shortcuts::ALL,
         );
         assert!(world.settle().settled);
-        assert!(!world.is_closed("thing_1"), "{name}");
+        assert!(!world.engine().is_closed("thing_1"), "{name}");
     }
 }
 
@@ -162,7 +162,7 @@ fn things_fall_into_a_closed_glass_and_it_opens_before() {
             Shortcuts::ALL,
         );
         wait(&mut world, secs);
-        assert!(world.is_closed("thing_1"));
+        assert!(world.engine().is_closed("thing_1"));
         world.poison("cube_1", Poison::Teleport([0.005, 0.0, 0.146 + height]));
         world.poison("cube_1", Poison::Velocity([0.0; 3]));
         let (command, start) = (world.hold(), world.time_secs());
@@ -170,7 +170,7 @@ fn things_fall_into_a_closed_glass_and_it_opens_before() {
             world.step(&command);
             let is_near = body(&world, "cube_1").pose.position[2] < 0.155;
             assert!(
-                !(is_near && world.is_closed("thing_1")),
+                !(is_near && world.engine().is_closed("thing_1")),
                 "closed with the cube at its mouth"
             );
         }
@@ -180,7 +180,10 @@ fn things_fall_into_a_closed_glass_and_it_opens_before() {
             cube[2] < 0.06 && cube[0].hypot(cube[1]) < 0.04,
             "the cube is at {cube:?}"
         );
-        assert!(!world.is_closed("thing_1"), "with something inside");
+        assert!(
+            !world.engine().is_closed("thing_1"),
+            "with something inside"
+        );
     }
 }
 

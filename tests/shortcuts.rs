@@ -36,7 +36,7 @@ fn a_hand_alone_grasps_and_holds_like_the_whole_robot() {
         let (trace, mut world) = picked(&model, shortcuts);
         let report = trace.actions[0].report.as_ref().expect("the skill reports");
         assert!(report.succeeded, "{}", report.message);
-        let [_, _, alone, whole] = world.ticks_by_reach();
+        let [_, _, alone, whole] = world.proximity().ticks_by_reach();
         assert_eq!(
             (alone > 0, whole > 0),
             (shortcuts == Shortcuts::ALL, shortcuts == Shortcuts::NONE)
@@ -56,7 +56,7 @@ fn a_hand_alone_grasps_and_holds_like_the_whole_robot() {
             heights,
             slip,
             after.rotation.angle_to(&before.rotation),
-            world.quality().deepest_penetration_m,
+            world.recorder().quality().deepest_penetration_m,
         ));
     }
     let [
@@ -99,7 +99,7 @@ fn a_pick_is_the_same_without_needless_sweeps() {
                 ..Shortcuts::ALL
             },
         );
-        (format!("{trace:?}"), world.swept())
+        (format!("{trace:?}"), world.engine().swept())
     };
     let [(always, swept), (seldom, swept_at_last)] = [of(false), of(true)];
     assert_eq!(always, seldom);
@@ -133,7 +133,7 @@ fn a_fast_thing_does_not_pass_through_the_floor() {
         let mut n_swept = 0;
         for _ in 0..120 {
             world.step(&hold);
-            n_swept += usize::from(world.swept());
+            n_swept += usize::from(world.engine().swept());
         }
         assert_eq!(world.fault(), None);
         let height = body(&world, "plate_1").pose.position[2];
@@ -216,8 +216,8 @@ fn a_hand_that_is_pushed_hard_gets_its_arm_back() {
         found.push((
             most,
             positions[lift],
-            world.quality().deepest_penetration_m,
-            world.ticks_by_reach(),
+            world.recorder().quality().deepest_penetration_m,
+            world.proximity().ticks_by_reach(),
         ));
     }
     let [

@@ -290,7 +290,7 @@ fn seals_form_and_break_with_the_same_bits() {
         let mut world = above([0.2, 0.2, 0.1], 0.01, 1.9);
         let command = close(&mut world);
         lift(&mut world, command, 0.1);
-        (world.state_digest(), holds(&world))
+        (world.recorder().state_digest(), holds(&world))
     };
     assert_eq!(digest(), digest());
 }

@@ -109,7 +109,7 @@ impl Operator<'_> {
 
     /// The depth camera.
     pub fn camera(&self) -> &Camera {
-        self.world.camera()
+        self.world.drive().camera()
     }
 
     /// True poses of all objects. For external programs that the campaign allows to see ground

@@ -58,7 +58,7 @@ fn to_furniture(world: &World) -> Option<Vector3<f64>> {
             0.0,
         ) - Point3::new(x, y, 0.0)
     };
-    let ways = world.floor_plan().outlines.iter().map(way);
+    let ways = world.drive().floor_plan().outlines.iter().map(way);
     ways.min_by(|a, b| a.norm().total_cmp(&b.norm()))
 }
 

@@ -210,12 +210,12 @@ impl<'a> Operator<'a> {
 
     /// The kinds of objects that the robot can recognise.
     pub fn known_kinds(&self) -> &[KnownKind] {
-        self.world.known_kinds()
+        self.world.drive().known_kinds()
     }
 
     /// The robot's map of its world.
     pub fn floor_plan(&self) -> &FloorPlan {
-        self.world.floor_plan()
+        self.world.drive().floor_plan()
     }
 
     /// The kind of object that a designator's value refers to. Returns `None` if the scene has no
@@ -255,7 +255,7 @@ impl<'a> Operator<'a> {
             ..perceived
         };
         if let Some(saboteur) = &mut self.saboteur {
-            perceived = saboteur.perceived(perceived, self.world.known_kinds());
+            perceived = saboteur.perceived(perceived, self.world.drive().known_kinds());
         }
         self.memory.perceived = Some(perceived.clone());
         self.perceived = Some(perceived);
@@ -301,7 +301,8 @@ impl<'a> Operator<'a> {
 
     /// The same if the robot has a map of this world, otherwise `None`.
     pub fn map_of_furniture(&self) -> Option<Vec<Sighting>> {
-        self.world.map_of_furniture()
+        let has_map = self.world.drive().has_map();
+        has_map.then(|| self.known_furniture())
     }
 
     /// Records a percept from the pictures of this action or, without any, from those of an earlier

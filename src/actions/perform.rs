@@ -120,7 +120,7 @@ pub fn perform_with(
     if let Some(playback) = interference.playback {
         *playback = world.take_playback();
     }
-    let tracks = world.tracks();
+    let tracks = world.recorder().tracks();
     let frames = Frames {
         period_secs: tracks.period_secs,
         names: tracks.names,
@@ -135,7 +135,7 @@ pub fn perform_with(
         snapshots,
         actions,
         frames,
-        hash: world.state_digest(),
+        hash: world.recorder().state_digest(),
         map: SceneMap::default(),
         forms,
         robot_courses,

@@ -52,7 +52,12 @@ pub(super) fn before(body: &BodyState, [x, y, heading]: [f64; 3]) -> Pose {
 
 /// A base pose outside all rooms, or well behind the current one if there are no rooms.
 pub(super) fn outside(world: &World, [x, y, heading]: [f64; 3]) -> [f64; 3] {
-    let ends = world.floor_plan().rooms.iter().map(|room| room.high_m[0]);
+    let ends = world
+        .drive()
+        .floor_plan()
+        .rooms
+        .iter()
+        .map(|room| room.high_m[0]);
     match ends.max_by(f64::total_cmp) {
         Some(end) => [end + CARRIED_OFF_M, y, heading],
         None => [

@@ -360,7 +360,7 @@ fn perform(
             map: scene.map.clone(),
             ..trace
         },
-        Some(world.quality()),
+        Some(world.recorder().quality()),
     ))
 }
 

@@ -120,7 +120,7 @@ impl Joints {
 
 /// The introduction of the robot in a world to the program of one worker.
 pub fn introduction(world: &World, worker: usize, privileged: bool) -> Introduction<'_> {
-    let (profile, camera) = (world.profile(), world.camera());
+    let (profile, camera) = (world.profile(), world.drive().camera());
     let joints = world.kinematics().joints();
     let roles = roles(world);
     let names = |wanted: &[usize]| {

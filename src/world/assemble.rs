@@ -8,9 +8,9 @@ use rapier3d::prelude::{
 };
 
 use crate::WorldError;
-use crate::drive::Law;
-use crate::engine::{Owner, off_floor, same_shape};
 use crate::motor::Motor;
+use crate::motor_law::Law;
+use crate::physics::{Owner, off_floor, same_shape};
 use actcheck_data::RobotProfile;
 use actcheck_geometry::{to_pose, to_real, to_vector};
 use actcheck_robot::{Joint, JointKind, RobotModel};

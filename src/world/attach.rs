@@ -8,8 +8,6 @@ use rapier3d::prelude::{
     SpringCoefficients,
 };
 
-use crate::World;
-use crate::object::Object;
 use actcheck_data::{PartJoint, SceneObject};
 use actcheck_geometry::{to_pose, to_real};
 
@@ -33,11 +31,48 @@ pub(super) struct Attachment {
     /// The same, in the frame of the part.
     on_part: Isometry3<f64>,
     /// How it moves.
-    pub(super) joint: PartJoint,
+    joint: PartJoint,
 }
 
-/// Attaches the parts among the objects, which are in the order of the scene.
-pub(super) fn attach(engine: &mut PhysicsWorld, scene: &[SceneObject], objects: &mut [Object]) {
+impl Attachment {
+    /// Returns how far a part is off the axis of its joint, with carrier and part at these poses.
+    /// Unit: metres.
+    pub(super) fn off_axis_m(&self, carrier: &Isometry3<f64>, part: &Isometry3<f64>) -> f64 {
+        let moved = self.moved(carrier, part);
+        let along = if self.joint.slides {
+            0.0
+        } else {
+            moved.translation.x
+        };
+        Vector3::new(along, moved.translation.y, moved.translation.z).norm()
+    }
+
+    /// Returns the position of the joint, with carrier and part at these poses. Units: metres or
+    /// radians.
+    pub(super) fn position(&self, carrier: &Isometry3<f64>, part: &Isometry3<f64>) -> f64 {
+        let moved = self.moved(carrier, part);
+        match self.joint.slides {
+            true => moved.translation.x,
+            // About x.
+            false => 2.0 * libm::atan2(moved.rotation.i, moved.rotation.w),
+        }
+    }
+
+    /// Returns the pose of the moved frame of the joint in its fixed one.
+    fn moved(&self, carrier: &Isometry3<f64>, part: &Isometry3<f64>) -> Isometry3<f64> {
+        let carrier = carrier * self.on_carrier;
+        carrier.inverse() * (part * self.on_part)
+    }
+}
+
+/// Attaches the parts among the objects to their carriers. `bodies` are those of the objects, in
+/// the order of the scene. Returns the attachments by the index of the part.
+pub(super) fn attach(
+    engine: &mut PhysicsWorld,
+    scene: &[SceneObject],
+    bodies: &[RigidBodyHandle],
+) -> BTreeMap<usize, Attachment> {
+    let mut attachments = BTreeMap::new();
     let indices: BTreeMap<&str, usize> = scene
         .iter()
         .enumerate()
@@ -67,10 +102,10 @@ pub(super) fn attach(engine: &mut PhysicsWorld, scene: &[SceneObject], objects: 
             on_part: part.pose.to_isometry().inverse() * frame,
             joint: attached.joint,
         };
-        insert(engine, objects[*to].body, objects[idx].body, &attachment);
+        insert(engine, bodies[*to], bodies[idx], &attachment);
         for handle in engine
             .bodies
-            .get(objects[idx].body)
+            .get(bodies[idx])
             .map(|body| body.colliders().to_vec())
             .unwrap_or_default()
         {
@@ -78,8 +113,9 @@ pub(super) fn attach(engine: &mut PhysicsWorld, scene: &[SceneObject], objects: 
                 collider.set_active_hooks(ActiveHooks::FILTER_CONTACT_PAIRS);
             }
         }
-        objects[idx].attached = Some(attachment);
+        attachments.insert(idx, attachment);
     }
+    attachments
 }
 
 fn insert(
@@ -122,49 +158,5 @@ fn insert(
         joint.set_motor(axis, 0.0, 0.0, 0.0, to_real(friction * FRICTION_GAIN));
         joint.set_motor_max_force(axis, to_real(friction));
         engine.impulse_joints.insert(carrier, part, joint, true);
-    }
-}
-
-impl World {
-    /// Returns the pose of the moved frame of a part's joint in its fixed one. Returns `None` if it
-    /// is not a part.
-    fn moved(&self, object: &Object) -> Option<(Isometry3<f64>, PartJoint)> {
-        let attachment = object.attached.as_ref()?;
-        let carrier = self.pose_of(&self.objects[attachment.to]) * attachment.on_carrier;
-        Some((
-            carrier.inverse() * (self.pose_of(object) * attachment.on_part),
-            attachment.joint,
-        ))
-    }
-
-    /// Returns how far a part is off the axis of its joint. Returns `None` if it is not a part.
-    /// Unit: metres.
-    pub(super) fn off_its_joint_m(&self, object: &Object) -> Option<f64> {
-        let (moved, joint) = self.moved(object)?;
-        let along = if joint.slides {
-            0.0
-        } else {
-            moved.translation.x
-        };
-        Some(Vector3::new(along, moved.translation.y, moved.translation.z).norm())
-    }
-
-    /// Returns the position of the joint of an object that is a part of another one. Units: metres
-    /// or radians.
-    pub(super) fn part_position(&self, object: &Object) -> Option<f64> {
-        let (moved, joint) = self.moved(object)?;
-        Some(match joint.slides {
-            true => moved.translation.x,
-            // About x.
-            false => 2.0 * libm::atan2(moved.rotation.i, moved.rotation.w),
-        })
-    }
-
-    /// Returns the whole that each part belongs to, by their indices in the scene.
-    pub(super) fn wholes(&self) -> BTreeMap<usize, usize> {
-        let parts = self.objects.iter().enumerate();
-        parts
-            .filter_map(|(idx, object)| Some((idx, object.attached.as_ref()?.whole)))
-            .collect()
     }
 }

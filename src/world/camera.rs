@@ -9,9 +9,10 @@ use nalgebra::{Isometry3, Point3};
 use parry3d::shape::Shape;
 use rapier3d::prelude::Collider;
 
-use crate::World;
-use crate::engine::{Owner, SHELL};
-use actcheck_data::{Camera, ChoiceName, Choices, Look, Pose, Stream};
+use crate::bodies::Bodies;
+use crate::drive::Drive;
+use crate::physics::{Owner, SHELL};
+use actcheck_data::{Camera, ChoiceName, Choices, Stream};
 use actcheck_geometry::{Lens, RayScene};
 use actcheck_geometry::{from_pose, to_real, to_vector};
 
@@ -59,72 +60,60 @@ impl DepthImage {
     }
 }
 
-impl World {
-    /// Takes an image from the camera's current true pose.
-    pub fn look(&self, choices: &mut Choices) -> DepthImage {
-        self.look_at_every(1, choices)
-    }
+/// Takes an image from the camera's current true pose, of which only every n-th pixel of every n-th
+/// row is measured, from the first on: the others are 0.
+pub(super) fn look(
+    bodies: &Bodies,
+    drive: &Drive,
+    stride: usize,
+    choices: &mut Choices,
+) -> DepthImage {
+    let camera = drive.camera();
+    let frame = choices.index(ChoiceName::CameraFrame, FRAMES);
+    let noise = (frame > 0).then(|| Noise {
+        camera,
+        stream: Stream::new(frame as u64),
+    });
+    let eye = bodies.robot.kinematics.camera(&bodies.robot.state().0);
+    let solids = RayScene::new(lens(camera), &eye, solids(bodies, drive, &eye));
+    picture(camera, &solids, noise.as_ref(), stride)
+}
 
-    /// Takes an image of which only every n-th pixel of every n-th row is measured, from the first
-    /// on: the others are 0.
-    pub fn look_at_every(&self, stride: usize, choices: &mut Choices) -> DepthImage {
-        let began_secs = self.watch_secs();
-        let camera = &self.sensing.camera;
-        let frame = choices.index(ChoiceName::CameraFrame, FRAMES);
-        let noise = (frame > 0).then(|| Noise {
-            camera,
-            stream: Stream::new(frame as u64),
+/// All shapes at the poses where sensors see them, except for the housing of a lens here.
+fn solids<'a>(
+    bodies: &'a Bodies,
+    drive: &'a Drive,
+    eye: &Isometry3<f64>,
+) -> impl Iterator<Item = (Isometry3<f64>, &'a dyn Shape)> {
+    let lens = to_vector(&eye.translation.vector);
+    let own = bodies.robot.kinematics.camera_link();
+    let visible = bodies
+        .physics
+        .colliders
+        .iter()
+        .map(|(_, collider)| collider)
+        .filter(move |collider| {
+            let Owner::Link(link) = Owner::from_tag(collider.user_data) else {
+                return collider.user_data & SHELL == 0;
+            };
+            let away = f64::from(collider.shape().distance_to_point(
+                collider.position(),
+                lens,
+                true,
+            ));
+            away > if Some(link) == own { HOUSING_M } else { 0.0 }
         });
-        let eye = self.robot.kinematics.camera(&self.robot.state().0);
-        let solids = RayScene::new(lens(camera), &eye, self.solids(&eye));
-        let image = picture(camera, &solids, noise.as_ref(), stride);
-        self.looked(began_secs);
-        image
-    }
+    visible.map(|collider| (shown_at(drive, collider), collider.shape()))
+}
 
-    /// Returns the data by which a percept of this moment can be compared with the truth.
-    pub fn current_look(&self) -> Look {
-        let base_true = self.base_true();
-        Look {
-            time_secs: self.time_secs(),
-            base_true,
-            base_believed: self.believed(base_true),
-            camera: Pose::from_isometry(&self.robot.kinematics.camera(&self.robot.state().0)),
-        }
-    }
-
-    /// All shapes at the poses where sensors see them, except for the housing of a lens here.
-    fn solids(&self, eye: &Isometry3<f64>) -> impl Iterator<Item = (Isometry3<f64>, &dyn Shape)> {
-        let lens = to_vector(&eye.translation.vector);
-        let own = self.robot.kinematics.camera_link();
-        let visible = self
-            .engine
-            .colliders
-            .iter()
-            .map(|(_, collider)| collider)
-            .filter(move |collider| {
-                let Owner::Link(link) = Owner::from_tag(collider.user_data) else {
-                    return collider.user_data & SHELL == 0;
-                };
-                let away = f64::from(collider.shape().distance_to_point(
-                    collider.position(),
-                    lens,
-                    true,
-                ));
-                away > if Some(link) == own { HOUSING_M } else { 0.0 }
-            });
-        visible.map(|collider| (self.shown_at(collider), collider.shape()))
-    }
-
-    fn shown_at(&self, collider: &Collider) -> Isometry3<f64> {
-        let decoy = match Owner::from_tag(collider.user_data) {
-            Owner::Object(idx) => self.decoys.get(&idx),
-            _ => None,
-        };
-        match (decoy, collider.position_wrt_parent()) {
-            (Some(shown), Some(local)) => shown * from_pose(local),
-            _ => from_pose(collider.position()),
-        }
+fn shown_at(drive: &Drive, collider: &Collider) -> Isometry3<f64> {
+    let decoy = match Owner::from_tag(collider.user_data) {
+        Owner::Object(idx) => drive.decoy(idx),
+        _ => None,
+    };
+    match (decoy, collider.position_wrt_parent()) {
+        (Some(shown), Some(local)) => shown * from_pose(local),
+        _ => from_pose(collider.position()),
     }
 }
 
@@ -217,6 +206,7 @@ mod tests {
 
     use super::*;
     use crate::robot::tests::{alone, lonely};
+    use crate::simulation::tests::bodies;
 
     const SMALL: Camera = Camera {
         width: 64,
@@ -244,7 +234,7 @@ mod tests {
     #[test]
     fn a_camera_does_not_see_its_housing() {
         let open = lonely();
-        let mut profile = open.robot.profile.as_ref().clone();
+        let mut profile = bodies(&open).robot.profile.as_ref().clone();
         let housing = "<link name=\"head_camera_link\"><collision><geometry><box size=\"0.1 0.1 0.1\"/></geometry></collision></link>";
         let text = profile
             .urdf

@@ -8,15 +8,19 @@ use rapier3d::prelude::{
     Collider, ContactData, ContactManifold, ContactPair, PhysicsWorld, SolverContact,
 };
 
-use crate::World;
-use crate::engine::Owner;
+use crate::bodies::Bodies;
 use crate::ownership::Ownership;
+use crate::physics::Owner;
+use crate::robot::SimulatedRobot;
 use actcheck_geometry::{from_pose, from_vector};
 use actcheck_robot::Twist;
 
 /// Contact forces below this are solver noise: a tenth of the weight of the lightest shipped model.
 /// Unit: newtons.
 pub const CONTACT_FLOOR_NEWTONS: f64 = 0.05;
+
+/// The contacts of a moment, by the owners of both sides in order: floor, objects, links.
+pub(super) type Touches = BTreeMap<(Owner, Owner), Touch>;
 
 /// The contact of two bodies at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,68 +62,75 @@ impl Touch {
 /// newtons.
 const MOST_PUSH: f64 = 20.0;
 
-impl World {
-    /// Returns all contacts above [`CONTACT_FLOOR_NEWTONS`] and the seal of a suction cup, by
-    /// ordered pair of owners.
-    pub(super) fn touches(&self) -> BTreeMap<(Owner, Owner), Touch> {
-        let mut found = touches(&self.engine);
-        found.extend(self.seal_touch());
-        // The engine keeps the last contacts of bodies that it no longer moves.
-        let has_left = |owner: &Owner| matches!(owner, Owner::Object(idx) if self.has_left(*idx));
-        found.retain(|(first, second), _| !has_left(first) && !has_left(second));
-        found
-    }
+/// Returns all contacts above [`CONTACT_FLOOR_NEWTONS`] and the seal of a suction cup, by ordered
+/// pair of owners.
+pub(super) fn touches(bodies: &Bodies, seal: Option<((Owner, Owner), Touch)>) -> Touches {
+    let mut found = contacts(&bodies.physics);
+    found.extend(seal);
+    // The engine keeps the last contacts of bodies that it no longer moves.
+    let has_left = |owner: &Owner| matches!(owner, Owner::Object(idx) if bodies.has_left(*idx));
+    found.retain(|(first, second), _| !has_left(first) && !has_left(second));
+    found
+}
 
-    /// Returns the force of all contacts on the robot's hand in the last step, with its torque
-    /// about the world's origin. Returns zero if the engine does not move the hand. Frame: world.
-    pub(super) fn push_on_hand(&self) -> Twist {
-        let mut push = Twist::ZERO;
-        let Some(hand) = self
-            .robot
-            .hand
-            .as_ref()
-            .filter(|_| self.robot.ownership != Ownership::Nothing)
-        else {
-            return push;
+/// Returns the force of all contacts on the robot's hand in the last step, with its torque
+/// about the world's origin. Returns zero if the engine does not move the hand. Frame: world.
+pub(super) fn push_on_hand(bodies: &Bodies) -> Twist {
+    let mut push = Twist::ZERO;
+    let Some(hand) = bodies
+        .robot
+        .hand
+        .as_ref()
+        .filter(|_| bodies.robot.ownership != Ownership::Nothing)
+    else {
+        return push;
+    };
+    let engine = &bodies.physics;
+    let per_second = 1.0 / f64::from(engine.integration_parameters.dt);
+    let is_ours = |handle| {
+        let collider: Option<&Collider> = engine.colliders.get(handle);
+        let owner = collider.map(|collider| Owner::from_tag(collider.user_data));
+        matches!(owner, Some(Owner::Link(link)) if hand.has(link))
+    };
+    for pair in engine
+        .narrow_phase
+        .contact_pairs()
+        .filter(|pair| has_solved(pair))
+    {
+        // Links of the hand push each other with opposite forces.
+        let sign = match (is_ours(pair.collider1), is_ours(pair.collider2)) {
+            (true, false) => -per_second,
+            (false, true) => per_second,
+            _ => continue,
         };
-        let engine = &self.engine;
-        let per_second = 1.0 / f64::from(engine.integration_parameters.dt);
-        let is_ours = |handle| {
-            let collider: Option<&Collider> = engine.colliders.get(handle);
-            let owner = collider.map(|collider| Owner::from_tag(collider.user_data));
-            matches!(owner, Some(Owner::Link(link)) if hand.has(link))
+        let Some(one) = engine.colliders.get(pair.collider1) else {
+            continue;
         };
-        for pair in engine
-            .narrow_phase
-            .contact_pairs()
-            .filter(|pair| has_solved(pair))
-        {
-            // Links of the hand push each other with opposite forces.
-            let sign = match (is_ours(pair.collider1), is_ours(pair.collider2)) {
-                (true, false) => -per_second,
-                (false, true) => per_second,
-                _ => continue,
-            };
-            let Some(one) = engine.colliders.get(pair.collider1) else {
-                continue;
-            };
-            for manifold in pair.solver_manifolds() {
-                let normal = from_vector(manifold.data.normal);
-                for point in solved(manifold).filter(|point| point.data.impulse > 0.0) {
-                    let force = impulse_of(point, &normal) * sign;
-                    let at = from_pose(one.position()) * Point3::from(from_vector(point.local_p1));
-                    push = push.plus(Twist::by_force(&force, &at), 1.0);
-                }
+        for manifold in pair.solver_manifolds() {
+            let normal = from_vector(manifold.data.normal);
+            for point in solved(manifold).filter(|point| point.data.impulse > 0.0) {
+                let force = impulse_of(point, &normal) * sign;
+                let at = from_pose(one.position()) * Point3::from(from_vector(point.local_p1));
+                push = push.plus(Twist::by_force(&force, &at), 1.0);
             }
         }
-        push
     }
+    push
+}
 
-    /// Returns whether contacts push a hand that moves alone harder than its arm would hold
-    /// unmoved.
-    pub(super) fn is_pushed_hard(&self) -> bool {
-        self.robot.push_on_hand.shift.norm() > MOST_PUSH
-    }
+/// Returns whether contacts push a hand that moves alone harder than its arm would hold
+/// unmoved.
+pub(super) fn is_pushed_hard(bodies: &Bodies) -> bool {
+    bodies.robot.push_on_hand.shift.norm() > MOST_PUSH
+}
+
+/// Returns whether both fingers touch an object, each with any of its links.
+pub(super) fn is_held(robot: &SimulatedRobot, object: usize, touches: &Touches) -> bool {
+    let touches = |link: &usize| touches.contains_key(&(Owner::Object(object), Owner::Link(*link)));
+    robot
+        .fingers
+        .iter()
+        .all(|finger| finger.iter().any(touches))
 }
 
 /// Returns whether the engine solved any point of a pair of colliders in the last step: it keeps
@@ -158,8 +169,8 @@ pub(super) fn impulse_of(
 
 /// Returns the contacts above [`CONTACT_FLOOR_NEWTONS`] that the engine found, by ordered pair of
 /// owners.
-fn touches(engine: &PhysicsWorld) -> BTreeMap<(Owner, Owner), Touch> {
-    let mut found: BTreeMap<(Owner, Owner), Touch> = BTreeMap::new();
+fn contacts(engine: &PhysicsWorld) -> Touches {
+    let mut found: Touches = BTreeMap::new();
     let per_second = 1.0 / f64::from(engine.integration_parameters.dt);
     for pair in engine
         .narrow_phase

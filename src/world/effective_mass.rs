@@ -16,40 +16,38 @@ pub(super) const LIGHT_KG: f64 = 0.8;
 /// its own mass, which then slips. With the shipped arm, that begins at 0.7 kg.
 pub(super) const CARRIED_SHARE: f64 = 0.5;
 
-impl SimulatedRobot {
-    /// Returns the least mass that a push at the grasp frame meets in any direction: the robot's
-    /// effective mass there, with the resistance of its motors during the push. Returns `None` if
-    /// the hand can't move alone.
-    ///
-    /// Source: O. Khatib, "Inertial properties in robotic manipulation: an object-level framework", 1995.
-    pub(super) fn least_effective_mass_kg(&self) -> Option<f64> {
-        let joints: Vec<usize> = self.joints_to(self.hand.as_ref()?.link).collect();
-        let poses = self.kinematics.links(&self.positions);
-        let at_rest = vec![0.0; self.motors.len()];
-        let resistances = self
-            .motors
-            .iter()
-            .zip(&self.model.joints)
-            .map(|(motor, joint)| {
-                motor.armature
-                    + PUSH_SECS * (joint.damping + motor.damping + PUSH_SECS * motor.stiffness)
-            });
-        let inertias = inertias(&self.model, &poses, &at_rest).with_rotors(resistances);
-        let point = Point3::from(self.kinematics.grasp(&self.positions).translation.vector);
-        let column = |axis: usize| {
-            let change =
-                inertias.answer(&joints, &Twist::by_force(&Vector3::ith(axis, 1.0), &point));
-            change.shift + change.turn.cross(&point.coords)
-        };
-        let mobility = Matrix3::from_columns(&[column(0), column(1), column(2)]);
-        Some(1.0 / mobility.symmetric_eigenvalues().max())
-    }
+/// Returns the least mass that a push at the grasp frame meets in any direction: the robot's
+/// effective mass there, with the resistance of its motors during the push. Returns `None` if
+/// the hand can't move alone.
+///
+/// Source: O. Khatib, "Inertial properties in robotic manipulation: an object-level framework", 1995.
+pub(super) fn least_effective_mass_kg(robot: &SimulatedRobot) -> Option<f64> {
+    let joints: Vec<usize> = robot.joints_to(robot.hand.as_ref()?.link).collect();
+    let poses = robot.kinematics.links(&robot.positions);
+    let at_rest = vec![0.0; robot.motors.len()];
+    let resistances = robot
+        .motors
+        .iter()
+        .zip(&robot.model.joints)
+        .map(|(motor, joint)| {
+            motor.armature
+                + PUSH_SECS * (joint.damping + motor.damping + PUSH_SECS * motor.stiffness)
+        });
+    let inertias = inertias(&robot.model, &poses, &at_rest).with_rotors(resistances);
+    let point = Point3::from(robot.kinematics.grasp(&robot.positions).translation.vector);
+    let column = |axis: usize| {
+        let change = inertias.answer(&joints, &Twist::by_force(&Vector3::ith(axis, 1.0), &point));
+        change.shift + change.turn.cross(&point.coords)
+    };
+    let mobility = Matrix3::from_columns(&[column(0), column(1), column(2)]);
+    Some(1.0 / mobility.symmetric_eigenvalues().max())
 }
 
 #[cfg(test)]
 mod tests {
     use crate::gripper_tests::{hand, turning};
     use crate::robot::tests::alone;
+    use crate::simulation::tests::bodies;
     use actcheck_base::Files;
     use std::path::Path;
 
@@ -62,12 +60,12 @@ mod tests {
             &turning(-0.6, 0.0),
             &["left", "right"],
         ));
-        let robot = &world.robot;
+        let robot = &bodies(&world).robot;
         let secs = super::PUSH_SECS;
         let resistance = secs * (secs * robot.motors[0].stiffness + robot.motors[0].damping);
         // The palm and two fingers.
         let expected = 0.3 + resistance;
-        let found = robot.least_effective_mass_kg().expect("it has a hand");
+        let found = super::least_effective_mass_kg(robot).expect("it has a hand");
         assert!(
             (found / expected - 1.0).abs() < 1e-9,
             "{found} kg instead of {expected} kg"
@@ -80,12 +78,10 @@ mod tests {
             let path = format!("models/robots/{name}.toml");
             let profile = actcheck_config::robot::read(&Files::Shipped, Path::new(&path));
             let world = alone(profile.expect("the shipped robot is valid"));
-            let mass_kg = world
-                .robot
-                .least_effective_mass_kg()
-                .expect("it has a hand");
+            let mass_kg =
+                super::least_effective_mass_kg(&bodies(&world).robot).expect("it has a hand");
             assert!(
-                mass_kg > super::LIGHT_KG && !world.robot.is_light,
+                mass_kg > super::LIGHT_KG && !bodies(&world).robot.is_light,
                 "{name}: {mass_kg} kg"
             );
         }

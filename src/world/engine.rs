@@ -1,210 +1,321 @@
-//! Configures the physics engine: gravity, solver, shapes, and the owners of colliders.
+//! The engine's part of a world: steps physics, with the mechanisms that the physics engine lacks,
+//! and finds faults.
+//!
+//! Never: knows what the robot believes, or records anything.
 
-use nalgebra::Vector3;
-use rapier3d::math::Pose;
-use rapier3d::prelude::{
-    CoefficientCombineRule, ColliderBuilder, Group, IntegrationParameters, InteractionGroups,
-    InteractionTestMode, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle, SharedShape,
-    SpringCoefficients,
-};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use crate::{WorldError, fault, fresh};
-use actcheck_data::{Part, Physics};
-use actcheck_geometry::{Hull, convex_shape};
-use actcheck_geometry::{to_pose, to_real, to_vector};
-use actcheck_robot::GRAVITY;
+use actcheck_data::{CONTROL_HZ, CupState, Scene};
+use actcheck_robot::Robot;
+use rapier3d::prelude::RigidBodyHandle;
 
-/// The owner of a collider.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Owner {
-    /// The floor.
-    Floor,
-    /// Object by its index in the scene.
-    Object(usize),
-    /// Link of the robot by its index.
-    Link(usize),
+use crate::attach::attach;
+use crate::bodies::{Bodies, Clock};
+use crate::contacts::{self, Touches, is_pushed_hard, push_on_hand};
+use crate::departure::Departures;
+use crate::furniture::Furniture;
+use crate::hollows;
+use crate::link_pairs::{LinkPairs, prepare_contacts};
+use crate::object::{self, Object};
+use crate::patches::Patches;
+use crate::physics::{add_floor, engine};
+use crate::proximity::Proximity;
+use crate::reach::Reach;
+use crate::robot::SimulatedRobot;
+use crate::suction::Cup;
+use crate::watch::Watch;
+use crate::{Fault, WorldError};
+
+/// Steps the bodies of a world.
+pub struct Engine {
+    bodies: Bodies,
+    /// The engine's substeps in each step of the whole robot.
+    substeps: usize,
+    /// The robot's suction cup; `None` if its gripper has fingers.
+    cup: Option<Cup>,
+    departures: Departures,
+    furniture: Furniture,
+    link_pairs: LinkPairs,
+    patches: Patches,
+    watch: Watch,
 }
 
-impl Owner {
-    /// Returns the owner as a collider's user data.
-    pub fn to_tag(self) -> u128 {
-        match self {
-            Self::Floor => 0,
-            Self::Object(idx) => 2 * (idx as u128) + 2,
-            Self::Link(idx) => 2 * (idx as u128) + 1,
+impl Engine {
+    /// Inserts the objects of a scene and its robot, which was compiled before.
+    ///
+    /// # Errors
+    /// [`WorldError`] if the robot or the physics settings are unusable.
+    pub(super) fn build(scene: &Scene, robot: &Robot) -> Result<Self, WorldError> {
+        let mut physics = engine(&scene.physics)?;
+        let floor = add_floor(&mut physics);
+        let robot = SimulatedRobot::insert(&mut physics, robot, &scene.robot)?;
+        let mut objects: Vec<Object> = scene
+            .objects
+            .iter()
+            .enumerate()
+            .map(|(idx, object)| object::insert(&mut physics, idx, object))
+            .collect();
+        let handles: Vec<RigidBodyHandle> = objects.iter().map(|object| object.body).collect();
+        for (idx, attachment) in attach(&mut physics, &scene.objects, &handles) {
+            objects[idx].attached = Some(attachment);
+        }
+        let steps_per_second = scene.physics.steps_per_second;
+        let clock = Clock {
+            n_steps: 0,
+            steps_per_tick: (steps_per_second / CONTROL_HZ).max(1),
+            steps_per_second,
+        };
+        let cup = robot.profile.suction.map(Cup::new);
+        let mut bodies = Bodies {
+            physics,
+            objects,
+            robot,
+            floor,
+            left: std::collections::BTreeSet::new(),
+            clock,
+        };
+        let link_pairs = LinkPairs::of(&bodies);
+        link_pairs.group_links(&mut bodies);
+        Ok(Self {
+            bodies,
+            substeps: scene.physics.iterations as usize,
+            cup,
+            departures: Departures::default(),
+            furniture: Furniture::default(),
+            link_pairs,
+            patches: Patches::default(),
+            watch: Watch::default(),
+        })
+    }
+
+    /// Sets the substeps in each step of the whole robot.
+    #[cfg(test)]
+    pub(super) fn set_substeps(&mut self, substeps: usize) {
+        self.substeps = substeps;
+    }
+
+    /// Returns the bodies.
+    pub(super) fn bodies(&self) -> &Bodies {
+        &self.bodies
+    }
+
+    /// Returns the bodies, to command or to disturb them.
+    pub(super) fn bodies_mut(&mut self) -> &mut Bodies {
+        &mut self.bodies
+    }
+
+    /// Returns the fault of the simulation, or `None` if there is none. A fault is permanent.
+    pub(super) fn fault(&self) -> Option<&Fault> {
+        self.departures.fault()
+    }
+
+    /// Returns the pairs of links that collide with each other.
+    pub(super) fn link_pairs(&self) -> &LinkPairs {
+        &self.link_pairs
+    }
+
+    /// Lets the robot's links pass through each other, or collide again.
+    pub(super) fn let_links_pass(&mut self, pass: bool) {
+        self.link_pairs.let_pass(pass);
+    }
+
+    /// Returns all contacts and the seal of a suction cup, by ordered pair of owners.
+    pub(super) fn touches(&self) -> Touches {
+        let seal = self.cup.as_ref().and_then(|cup| cup.touch(&self.bodies));
+        contacts::touches(&self.bodies, seal)
+    }
+
+    /// Returns the gap between the fingers; for a suction cup, 0 while its vacuum is on, otherwise
+    /// its diameter. Unit: metres.
+    pub(super) fn opening_m(&self, positions: &[f64]) -> f64 {
+        self.cup.as_ref().map_or_else(
+            || self.bodies.robot.layout.gripper.opening_m(positions),
+            Cup::opening_m,
+        )
+    }
+
+    /// Returns the force of each finger's motor; for a suction cup, the force of its vacuum, in the
+    /// place of both fingers. Unit: newtons.
+    pub(super) fn grip_forces_n(&self) -> [f64; 2] {
+        self.cup.as_ref().map_or_else(
+            || self.bodies.robot.finger_efforts(),
+            |cup| [cup.suction_n(); 2],
+        )
+    }
+
+    /// Returns the state of the suction cup. Returns `None` if the gripper has fingers.
+    pub(super) fn cup_state(&self) -> Option<CupState> {
+        self.cup.as_ref().map(Cup::state)
+    }
+
+    /// Returns the object that a suction cup holds, by its index.
+    pub(super) fn sealed(&self) -> Option<usize> {
+        self.cup.as_ref().and_then(Cup::sealed)
+    }
+
+    /// Switches the vacuum of a suction cup on or off, by the commanded opening and force.
+    pub(super) fn switch_vacuum(&mut self, opening_m: f64, force_n: f64) {
+        if let Some(cup) = &mut self.cup {
+            cup.switch(&mut self.bodies.physics, opening_m, force_n);
         }
     }
 
-    /// Returns the owner from a collider's user data.
-    pub fn from_tag(tag: u128) -> Self {
-        let tag = tag & !SHELL;
-        let idx = usize::try_from(tag.saturating_sub(1) / 2).unwrap_or(usize::MAX);
-        match tag {
-            0 => Self::Floor,
-            tag if tag % 2 == 1 => Self::Link(idx),
-            _ => Self::Object(idx),
+    /// Performs the steps of a control tick, unless there is a fault. Returns whether the tick
+    /// ended without one.
+    pub(super) fn tick(&mut self, proximity: &mut Proximity) -> bool {
+        if self.fault().is_some() {
+            return false;
         }
+        if let Some(cup) = &mut self.cup {
+            cup.seal_surface(&mut self.bodies);
+        }
+        let robot = &self.bodies.robot;
+        let poses = robot.kinematics.links(&robot.positions);
+        let holding = robot.kinematics.holding_efforts_at(&poses);
+        // Furniture that slides, and a seal, are joints that only the whole engine solves.
+        let is_tied = self.furniture.slides() || self.sealed().is_some();
+        let reach = proximity.update(&mut self.bodies, &self.link_pairs, is_tied, poses);
+        hollows::close_hollows(&mut self.bodies, proximity.shortcuts(), reach);
+        self.step_all(proximity, reach, &holding)
     }
-}
 
-/// Mark in the user data of a collider that replaces others: see `shell.rs`.
-pub const SHELL: u128 = 1 << 127;
-
-/// Natural frequency of contacts between moving bodies. Unit: hertz. Reduces the penetration in a
-/// grasp from 1.8 mm (at 30 Hz, the engine's default) to a few tenths of a millimetre.
-const CONTACT_FREQUENCY_HZ: f32 = 90.0;
-/// Natural frequency of contacts with static bodies. Unit: hertz. Stiffer contacts lift a rolling
-/// rim a little in every step, which keeps objects rocking; at 20 Hz a salt mill sinks in and
-/// tilts.
-const SUPPORT_FREQUENCY_HZ: f32 = 30.0;
-/// Damping ratio of contacts: the engine's default, which keeps stacks at rest.
-const CONTACT_DAMPING: f32 = 10.0;
-/// The engine's unit of length. It keeps pairs of shapes whose boxes are nearer to each other than
-/// 8 cm in this unit, and looks at them in every step. Unit: metres.
-pub const LENGTH_UNIT: f32 = 0.125;
-/// Friction coefficient of the floor: that of wood.
-pub(super) const FLOOR_FRICTION: f32 = 0.5;
-
-/// Creates an engine without bodies.
-///
-/// # Errors
-/// [`WorldError::Scene`] if `physics` has fewer than 30 steps per second or no iterations.
-pub fn engine(physics: &Physics) -> Result<PhysicsWorld, WorldError> {
-    if physics.steps_per_second < 30 || physics.iterations == 0 {
-        let what = format!(
-            "physics can't run with {} steps per second and {} iterations",
-            physics.steps_per_second, physics.iterations
-        );
-        return Err(WorldError::Scene { what });
-    }
-    let softness = |frequency| SpringCoefficients {
-        natural_frequency: frequency,
-        damping_ratio: CONTACT_DAMPING,
-    };
-    let defaults = IntegrationParameters::default();
-    let parameters = IntegrationParameters {
-        length_unit: LENGTH_UNIT,
-        normalized_allowed_linear_error: defaults.normalized_allowed_linear_error / LENGTH_UNIT,
-        normalized_max_corrective_velocity: defaults.normalized_max_corrective_velocity
-            / LENGTH_UNIT,
-        normalized_prediction_distance: defaults.normalized_prediction_distance / LENGTH_UNIT,
-        normalized_max_linear_velocity: defaults.normalized_max_linear_velocity / LENGTH_UNIT,
-        dt: 1.0 / to_real(f64::from(physics.steps_per_second)),
-        num_solver_iterations: physics.iterations as usize,
-        // Without it, friction acts only in the second of the solver's two passes, and every grasp
-        // slips slowly.
-        friction_in_bias_pass: true,
-        contact_softness: softness(CONTACT_FREQUENCY_HZ),
-        static_contact_softness: softness(SUPPORT_FREQUENCY_HZ),
-        // Recycled contacts may be off by centimetres, but contacts decide verdicts.
-        contact_recycling: false,
-        ..defaults
-    };
-    let gravity = to_vector(&Vector3::new(0.0, 0.0, -GRAVITY));
-    let narrow_phase = fresh::narrow_phase();
-    Ok(PhysicsWorld {
-        gravity,
-        integration_parameters: parameters,
-        narrow_phase,
-        ..PhysicsWorld::default()
-    })
-}
-
-/// The collision group of the floor.
-pub const FLOOR_GROUP: Group = Group::GROUP_32;
-
-/// Returns the collision groups of a body that does not collide with the floor.
-pub fn off_floor() -> InteractionGroups {
-    InteractionGroups::new(
-        Group::ALL,
-        Group::ALL.difference(FLOOR_GROUP),
-        InteractionTestMode::And,
-    )
-}
-
-/// Adds the floor: a slab with its top at z = 0. Returns a fixed body at the origin, without a
-/// shape, for joints to the floor.
-pub fn add_floor(engine: &mut PhysicsWorld) -> RigidBodyHandle {
-    let half = to_real(fault::WORLD_RADIUS_M + 1.0);
-    let floor = ColliderBuilder::cuboid(half, half, 0.5)
-        .position(to_pose(&nalgebra::Isometry3::translation(0.0, 0.0, -0.5)))
-        .friction(FLOOR_FRICTION)
-        .friction_combine_rule(CoefficientCombineRule::GeometricMean)
-        .collision_groups(InteractionGroups::new(
-            FLOOR_GROUP,
-            Group::ALL,
-            InteractionTestMode::And,
-        ))
-        .user_data(Owner::Floor.to_tag());
-    engine.insert_collider(floor, None);
-    engine.insert_body(RigidBodyBuilder::fixed())
-}
-
-/// Returns a collider for a convex solid in its body's frame. Returns `None` for tubes, which the
-/// caller must decompose first, and for points without a volume.
-///
-/// The friction of two surfaces is the geometric mean of their coefficients: a scene's value is
-/// that against the same material.
-pub fn collider(
-    solid: &Part,
-    owner: Owner,
-    friction: f64,
-    restitution: f64,
-) -> Option<ColliderBuilder> {
-    let (shape, pose) = convex_shape(solid)?;
-    Some(with_surface(
-        ColliderBuilder::new(shape)
-            .position(pose)
-            .restitution(to_real(restitution)),
-        owner,
-        friction,
-    ))
-}
-
-/// Returns the collider of a shape that another one has already, at the same pose. A hull
-/// `with_memory` remembers the shapes around it.
-pub fn same_shape(
-    shape: &SharedShape,
-    pose: &Pose,
-    owner: Owner,
-    friction: f64,
-    with_memory: bool,
-) -> ColliderBuilder {
-    // Hulls remember boxes and shapes around them, which are others in each simulation.
-    let own = match shape.as_shape::<Hull>().filter(|_| with_memory) {
-        Some(hull) => SharedShape::new(hull.with_memory()),
-        None => SharedShape(shape.clone_dyn().into()),
-    };
-    with_surface(
-        ColliderBuilder::new(own).position(*pose).restitution(0.0),
-        owner,
-        friction,
-    )
-}
-
-fn with_surface(builder: ColliderBuilder, owner: Owner, friction: f64) -> ColliderBuilder {
-    builder
-        .friction(to_real(friction))
-        .friction_combine_rule(CoefficientCombineRule::GeometricMean)
-        .user_data(owner.to_tag())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn owners_are_recovered_from_their_numbers() {
-        for owner in [
-            Owner::Floor,
-            Owner::Object(0),
-            Owner::Object(7),
-            Owner::Link(0),
-            Owner::Link(12),
-        ] {
-            for marks in [0, SHELL] {
-                assert_eq!(Owner::from_tag(owner.to_tag() | marks), owner);
+    /// Performs the steps of a tick in which the robot can touch this. Returns whether they ended
+    /// without a fault.
+    pub(super) fn step_all(
+        &mut self,
+        proximity: &mut Proximity,
+        mut reach: Reach,
+        holding: &[f64],
+    ) -> bool {
+        let Clock {
+            steps_per_tick,
+            steps_per_second,
+            ..
+        } = self.bodies.clock;
+        let dt = 1.0 / f64::from(steps_per_second);
+        self.bodies.robot.begin_tick();
+        prepare_contacts(&mut self.bodies);
+        self.patches.rub(&mut self.bodies, reach);
+        for step in 0..steps_per_tick {
+            if reach == Reach::Hand && is_pushed_hard(&self.bodies) {
+                proximity.need_whole();
+                reach = Reach::All;
+            }
+            let Bodies { physics, robot, .. } = &mut self.bodies;
+            // The engine and the equations of free motion fail on numbers that are not finite.
+            if let Some(joint) = robot.invalid_joint() {
+                self.departures.fault_of_joint(joint.to_owned());
+                return false;
+            }
+            proximity.set_substeps(physics, self.substeps, reach);
+            robot.hand_over(physics, reach.ownership());
+            robot.control(physics, holding, dt, steps_per_tick - step);
+            let ends_tick = step + 1 == steps_per_tick;
+            self.step_robot(reach, dt, ends_tick);
+            let share = 1.0 / f64::from(steps_per_tick);
+            let Bodies { physics, robot, .. } = &mut self.bodies;
+            robot.measure(physics, holding, share);
+            if let Some(cup) = &mut self.cup {
+                cup.measure_seal(physics, share, step == 0);
+            }
+            self.bodies.clock.n_steps += 1;
+            // Without the engine, no body moves before the end of the tick.
+            if ends_tick || reach != Reach::Nothing {
+                self.departures.check(&mut self.bodies, &self.link_pairs);
+            }
+            if self.fault().is_some() {
+                return false;
             }
         }
+        if let Some(cup) = &mut self.cup {
+            cup.judge_seal(&mut self.bodies.physics);
+        }
+        true
     }
+
+    /// Performs one step of physics; links that the engine does not move follow at the end of the
+    /// tick.
+    fn step_robot(&mut self, reach: Reach, dt: f64, ends_tick: bool) {
+        let Bodies { physics, robot, .. } = &mut self.bodies;
+        if reach != Reach::All {
+            robot.move_freely(physics);
+        }
+        match reach {
+            Reach::Nothing if ends_tick => robot.place_links(physics),
+            Reach::Nothing => {}
+            Reach::Apart | Reach::Hand => {
+                robot.lead_hand(physics, dt);
+                if ends_tick {
+                    robot.lead_links(physics);
+                }
+                self.step_physics();
+            }
+            Reach::All => self.step_physics(),
+        }
+        let Bodies { physics, robot, .. } = &mut self.bodies;
+        robot.take_state(physics);
+        self.bodies.robot.push_on_hand = push_on_hand(&self.bodies);
+    }
+
+    fn step_physics(&mut self) {
+        let began_secs = self.watch.now_secs();
+        let (physics, link_pairs) = (&mut self.bodies.physics, &self.link_pairs);
+        // After a panic, the world has a fault and takes no further step.
+        let step = catch_unwind(AssertUnwindSafe(|| {
+            physics.step_with_events(link_pairs, &())
+        }));
+        if let Err(panic) = step {
+            self.departures.engine_panicked(words_of(panic.as_ref()));
+        }
+        self.watch.stepped(began_secs);
+    }
+
+    /// Takes the contacts after a tick into account: objects that the robot moves may leave the
+    /// world, and furniture that it pushes slides.
+    pub(super) fn end_tick(&mut self, touches: &Touches) {
+        self.departures.record(&self.bodies, touches);
+        self.furniture.move_pushed(&mut self.bodies, touches);
+    }
+
+    /// Measures the wall time from now on, with a clock in seconds.
+    pub(super) fn start_watch(&mut self, clock_secs: fn() -> f64) {
+        self.watch = Watch::new(clock_secs);
+    }
+
+    /// Returns the watch.
+    pub(super) fn watch(&self) -> &Watch {
+        &self.watch
+    }
+
+    /// Returns the wall time of the engine's steps since [`World::watch`](crate::World::watch); 0
+    /// without it. Unit: seconds.
+    pub fn engine_secs(&self) -> f64 {
+        self.watch.engine_secs()
+    }
+
+    /// Returns the wall time of camera images since [`World::watch`](crate::World::watch); 0
+    /// without it. Unit: seconds.
+    pub fn camera_secs(&self) -> f64 {
+        self.watch.camera_secs()
+    }
+
+    /// Returns whether the engine swept fast shapes in the last tick, so that they pass through
+    /// nothing fixed.
+    pub fn swept(&self) -> bool {
+        self.bodies.physics.integration_parameters.max_ccd_substeps > 0
+    }
+
+    /// Returns whether all tubes of an object are closed, and there is one: for comparisons.
+    pub fn is_closed(&self, id: &str) -> bool {
+        hollows::are_closed(&self.bodies, id)
+    }
+}
+
+/// The words of a panic.
+fn words_of(panic: &(dyn std::any::Any + Send)) -> String {
+    let words = panic.downcast_ref::<String>().map(String::as_str);
+    words
+        .or_else(|| panic.downcast_ref::<&str>().copied())
+        .unwrap_or("no reason was given")
+        .to_owned()
 }

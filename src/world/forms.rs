@@ -2,27 +2,25 @@
 
 use nalgebra::Vector3;
 
-use crate::World;
+use crate::bodies::Bodies;
 use actcheck_data::{Part, Shape};
 
-impl World {
-    /// Returns the shapes of all objects and links by their names in traces, in the frame of the
-    /// object or link. Pieces of meshes are reduced to their outermost points.
-    pub fn forms(&self) -> Vec<(String, Vec<Part>)> {
-        let objects = self
-            .objects
-            .iter()
-            .map(|object| (object.id.clone(), reduced(&object.model.parts)));
-        let links = self
-            .robot
-            .model
-            .links
-            .iter()
-            .filter(|link| !link.solids.is_empty());
-        objects
-            .chain(links.map(|link| (format!("robot/{}", link.name), reduced(&link.solids))))
-            .collect()
-    }
+/// Returns the shapes of all objects and links by their names in traces, in the frame of the
+/// object or link. Pieces of meshes are reduced to their outermost points.
+pub(super) fn forms(bodies: &Bodies) -> Vec<(String, Vec<Part>)> {
+    let objects = bodies
+        .objects
+        .iter()
+        .map(|object| (object.id.clone(), reduced(&object.model.parts)));
+    let links = bodies
+        .robot
+        .model
+        .links
+        .iter()
+        .filter(|link| !link.solids.is_empty());
+    objects
+        .chain(links.map(|link| (format!("robot/{}", link.name), reduced(&link.solids))))
+        .collect()
 }
 
 fn reduced(parts: &[Part]) -> Vec<Part> {

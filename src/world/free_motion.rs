@@ -9,7 +9,7 @@ use nalgebra::Isometry3;
 use rapier3d::prelude::PhysicsWorld;
 
 use crate::assemble::{STOP_DAMPING, STOP_FREQUENCY_HZ, WIDEST_RANGE};
-use crate::drive::VelocityConstraint;
+use crate::motor_law::VelocityConstraint;
 use crate::ownership::{Hand, Ownership};
 use crate::robot::SimulatedRobot;
 use actcheck_robot::Factor;
@@ -264,17 +264,23 @@ impl SimulatedRobot {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bodies::Bodies;
     use crate::robot::tests::lonely;
+    use crate::simulation::tests::{bodies, bodies_mut, set_substeps};
     use crate::{GRAVITY, Shortcuts, World};
     use actcheck_data::Choices;
 
     fn dynamics(world: &World) -> (Vec<f64>, Inertias) {
-        let (positions, velocities) = world.robot.state();
-        let poses = world.robot.kinematics.links(&positions);
-        let armatures = world.robot.motors.iter().map(|motor| motor.armature);
+        let (positions, velocities) = bodies(world).robot.state();
+        let poses = bodies(world).robot.kinematics.links(&positions);
+        let armatures = bodies(world)
+            .robot
+            .motors
+            .iter()
+            .map(|motor| motor.armature);
         (
             positions,
-            inertias(&world.robot.model, &poses, &velocities).with_rotors(armatures),
+            inertias(&bodies(world).robot.model, &poses, &velocities).with_rotors(armatures),
         )
     }
 
@@ -310,17 +316,16 @@ mod tests {
     fn the_mass_matrix_is_that_of_the_engine() {
         let (mut world, mut choices) = (lonely(), Choices::random(4, 0));
         // The engine knows the masses of links once it has stepped.
-        world.engine.step();
+        bodies_mut(&mut world).physics.step();
         for _ in 0..3 {
             wander(&mut world, &mut choices);
             let (_, found) = dynamics(&world);
-            let robot = &world.robot;
-            let (multibody, _) = world
-                .engine
+            let Bodies { robot, physics, .. } = bodies_mut(&mut world);
+            let (multibody, _) = physics
                 .multibody_joints
                 .get_mut(robot.motors[0].joint)
                 .expect("it has joints");
-            let theirs = multibody.dof_inverse_inertia(&world.engine.bodies);
+            let theirs = multibody.dof_inverse_inertia(&physics.bodies);
             for joint in 0..robot.motors.len() {
                 let product = found.apparent(joint) * f64::from(theirs[joint]);
                 assert!((product - 1.0).abs() < 5e-3, "joint {joint}: {product}");
@@ -332,7 +337,7 @@ mod tests {
     fn free_joints_keep_their_energy() {
         let (mut world, mut choices) = (lonely(), Choices::random(6, 0));
         wander(&mut world, &mut choices);
-        let robot = &world.robot;
+        let robot = &bodies(&world).robot;
         let (mut positions, _) = dynamics(&world);
         let mut velocities: Vec<f64> = positions
             .iter()
@@ -379,18 +384,20 @@ mod tests {
     #[test]
     fn joints_move_through_free_space_as_in_the_engine() {
         let (mut free, mut engine) = (lonely(), lonely());
-        engine.leave_to_engine();
+        engine.take_shortcuts(Shortcuts::NONE);
         // As many substeps in both: the engine solves motors and couplings only by iteration.
         free.take_shortcuts(Shortcuts {
             few_substeps: false,
             ..Shortcuts::ALL
         });
-        (free.substeps, engine.substeps) = (4, 4);
+        for world in [&mut free, &mut engine] {
+            set_substeps(world, 4);
+        }
         let [mut ones, mut others] = [Choices::random(8, 0), Choices::random(8, 0)];
         for _ in 0..6 {
             wander(&mut free, &mut ones);
             wander(&mut engine, &mut others);
-            assert!(!engine.moved_freely());
+            assert!(!engine.proximity().moved_freely());
             let (one, other) = (free.observe(), engine.observe());
             for (idx, joint) in free.kinematics().joints().iter().enumerate() {
                 let off = (one.positions[idx] - other.positions[idx]).abs();
@@ -403,15 +410,15 @@ mod tests {
     fn the_engine_continues_where_free_motion_ended() {
         let (mut world, mut choices) = (lonely(), Choices::random(9, 0));
         let mut command = world.hold();
-        world.substeps = 4;
+        set_substeps(&mut world, 4);
         let lift = world.layout().arm[0];
         command.positions[lift] = 0.4;
         (0..30).for_each(|_| world.step(&command));
-        assert!(world.moved_freely());
+        assert!(world.proximity().moved_freely());
         let before = world.observe();
-        world.leave_to_engine();
+        world.take_shortcuts(Shortcuts::NONE);
         // As many as free motion took.
-        world.substeps = 2;
+        set_substeps(&mut world, 2);
         world.step(&command);
         let after = world.observe();
         assert!(
@@ -431,14 +438,14 @@ mod tests {
     #[test]
     fn twice_the_substeps_change_the_speed_of_a_joint_little() {
         let mut world = lonely();
-        world.substeps = 4;
+        set_substeps(&mut world, 4);
         let mut command = world.hold();
         let lift = world.layout().arm[0];
         command.positions[lift] = 0.4;
         (0..30).for_each(|_| world.step(&command));
-        assert!(world.moved_freely());
+        assert!(world.proximity().moved_freely());
         let before = world.observe();
-        world.leave_to_engine();
+        world.take_shortcuts(Shortcuts::NONE);
         world.step(&command);
         let after = world.observe();
         assert!((after.velocities[lift] / before.velocities[lift] - 1.0).abs() < 0.05);

@@ -12,11 +12,10 @@ use rapier3d::prelude::{
     RigidBodyType,
 };
 
-use crate::World;
-use crate::contacts::Touch;
-use crate::engine::{Owner, off_floor};
+use crate::bodies::Bodies;
+use crate::contacts::Touches;
 use crate::object::Object;
-use actcheck_data::Role;
+use crate::physics::{Owner, off_floor};
 use actcheck_geometry::{from_vector, to_pose, to_real};
 use actcheck_robot::GRAVITY;
 
@@ -33,37 +32,55 @@ const LEVER_SHARE: f64 = 0.4;
 
 /// One piece of furniture while it slides.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sliding {
+struct Sliding {
     joint: ImpulseJointHandle,
     anchor: RigidBodyHandle,
     /// Time since the last push. Unit: seconds.
     alone_secs: f64,
 }
 
-impl World {
+/// The furniture of a world that slides at the moment.
+#[derive(Debug, Default)]
+pub(super) struct Furniture {
+    /// By the index of the object.
+    sliding: BTreeMap<usize, Sliding>,
+}
+
+impl Furniture {
+    /// Returns whether any furniture slides.
+    pub(super) fn slides(&self) -> bool {
+        !self.sliding.is_empty()
+    }
+
     /// Lets furniture slide that is pushed harder than its friction, and stops furniture that is
     /// left alone.
-    pub(super) fn move_furniture(&mut self, touches: &BTreeMap<(Owner, Owner), Touch>) {
+    pub(super) fn move_pushed(&mut self, bodies: &mut Bodies, touches: &Touches) {
         let pushes = pushes(touches);
-        for idx in 0..self.objects.len() {
-            let object = &self.objects[idx];
+        for idx in 0..bodies.objects.len() {
+            let object = &bodies.objects[idx];
             if !object.slides {
                 continue;
             }
             let push_n = pushes.get(&idx).copied().unwrap_or(0.0);
             match self.sliding.get(&idx).copied() {
                 None if push_n > friction_n(object) => {
-                    let sliding = release(&mut self.engine, object);
+                    let sliding = release(&mut bodies.physics, object);
                     self.sliding.insert(idx, sliding);
                 }
                 None => {}
-                Some(sliding) => self.keep_sliding(idx, sliding, push_n > 0.0),
+                Some(sliding) => self.keep_sliding(bodies, idx, sliding, push_n > 0.0),
             }
         }
     }
 
-    fn keep_sliding(&mut self, idx: usize, mut sliding: Sliding, pushed: bool) {
-        let Some(body) = self.engine.bodies.get(self.objects[idx].body) else {
+    fn keep_sliding(
+        &mut self,
+        bodies: &mut Bodies,
+        idx: usize,
+        mut sliding: Sliding,
+        pushed: bool,
+    ) {
+        let Some(body) = bodies.physics.bodies.get(bodies.objects[idx].body) else {
             return;
         };
         let moves = from_vector(body.linvel()).norm() > STOPPED
@@ -71,20 +88,15 @@ impl World {
         sliding.alone_secs = if pushed || moves {
             0.0
         } else {
-            sliding.alone_secs + self.tick_secs()
+            sliding.alone_secs + bodies.tick_secs()
         };
         if sliding.alone_secs > LEFT_ALONE_SECS {
             self.sliding.remove(&idx);
-            fix(&mut self.engine, &self.objects[idx], sliding);
+            fix(&mut bodies.physics, &bodies.objects[idx], sliding);
         } else {
             self.sliding.insert(idx, sliding);
         }
     }
-}
-
-/// Returns whether an object in this role slides when it is pushed: furniture that is not built in.
-pub(super) fn slides(role: Role, built_in: bool) -> bool {
-    role == Role::Platform && !built_in
 }
 
 /// Largest force of the floor's friction on a piece of furniture. Unit: newtons.
@@ -93,7 +105,7 @@ fn friction_n(object: &Object) -> f64 {
 }
 
 /// Horizontal force of the robot on each object, by index. Unit: newtons.
-fn pushes(touches: &BTreeMap<(Owner, Owner), Touch>) -> BTreeMap<usize, f64> {
+fn pushes(touches: &Touches) -> BTreeMap<usize, f64> {
     let mut forces: BTreeMap<usize, [f64; 2]> = BTreeMap::new();
     for (pair, touch) in touches {
         if let (Owner::Object(idx), Owner::Link(_)) = pair {

@@ -6,44 +6,46 @@
 
 use rapier3d::prelude::RigidBody;
 
-use crate::World;
+use crate::bodies::Bodies;
 use crate::reach::Reach;
 
-impl World {
-    /// Takes the shapes of idle links out of the engine's search for contacts, and puts back those
-    /// of the others, in a tick in which the robot can touch this.
-    pub(super) fn leave_out_idle(&mut self, reach: Reach) {
-        if !self.robot.model.has_many_pieces() {
-            return;
-        }
-        for (link, body) in self.robot.bodies.iter().enumerate() {
-            let is_idle = self.is_idle(link, reach);
-            for handle in self
-                .engine
-                .bodies
-                .get(*body)
-                .map(RigidBody::colliders)
-                .unwrap_or_default()
+/// Takes the shapes of idle links out of the engine's search for contacts, and puts back those
+/// of the others, in a tick in which the robot can touch this.
+pub(super) fn leave_out_idle(bodies: &mut Bodies, reach: Reach) {
+    if !bodies.robot.model.has_many_pieces() {
+        return;
+    }
+    for (link, body) in bodies.robot.bodies.iter().enumerate() {
+        let is_idle = is_idle(bodies, link, reach);
+        for handle in bodies
+            .physics
+            .bodies
+            .get(*body)
+            .map(RigidBody::colliders)
+            .unwrap_or_default()
+        {
+            // Asking for a change would already be one.
+            if bodies
+                .physics
+                .colliders
+                .get(*handle)
+                .is_some_and(|collider| collider.is_enabled() == is_idle)
+                && let Some(collider) = bodies.physics.colliders.get_mut(*handle)
             {
-                // Asking for a change would already be one.
-                if self
-                    .engine
-                    .colliders
-                    .get(*handle)
-                    .is_some_and(|collider| collider.is_enabled() == is_idle)
-                    && let Some(collider) = self.engine.colliders.get_mut(*handle)
-                {
-                    collider.set_enabled(!is_idle);
-                }
+                collider.set_enabled(!is_idle);
             }
         }
     }
+}
 
-    fn is_idle(&self, link: usize, reach: Reach) -> bool {
-        let of_hand = self.robot.hand.as_ref().is_some_and(|hand| hand.has(link));
-        let can_touch = reach == Reach::All || reach == Reach::Hand && of_hand;
-        !can_touch && self.robot.joints_to(link).next().is_some()
-    }
+fn is_idle(bodies: &Bodies, link: usize, reach: Reach) -> bool {
+    let of_hand = bodies
+        .robot
+        .hand
+        .as_ref()
+        .is_some_and(|hand| hand.has(link));
+    let can_touch = reach == Reach::All || reach == Reach::Hand && of_hand;
+    !can_touch && bodies.robot.joints_to(link).next().is_some()
 }
 
 #[cfg(test)]
@@ -53,12 +55,14 @@ mod tests {
     use rapier3d::prelude::RigidBodyHandle;
 
     use super::*;
+    use crate::World;
     use crate::robot::tests::{alone, lonely};
+    use crate::simulation::tests::{bodies, bodies_mut, step_with};
     use actcheck_geometry::from_pose;
 
     /// The shipped robot with a forearm of many pieces.
     fn with_pieces() -> World {
-        let profile = lonely().robot.profile.as_ref().clone();
+        let profile = bodies(&lonely()).robot.profile.as_ref().clone();
         let link = "<link name=\"wrist_flex_link\">";
         assert!(profile.urdf.text.contains(link));
         let piece =
@@ -71,10 +75,15 @@ mod tests {
     /// Returns the names of the links whose shapes are in the search.
     fn searched(world: &World) -> BTreeSet<String> {
         let is_searched = |body: RigidBodyHandle| {
-            let mut colliders = world.engine.bodies[body].colliders().iter();
-            colliders.any(|handle| world.engine.colliders[*handle].is_enabled())
+            let mut colliders = bodies(world).physics.bodies[body].colliders().iter();
+            colliders.any(|handle| bodies(world).physics.colliders[*handle].is_enabled())
         };
-        let links = world.robot.model.links.iter().zip(&world.robot.bodies);
+        let links = bodies(world)
+            .robot
+            .model
+            .links
+            .iter()
+            .zip(&bodies(world).robot.bodies);
         let searched = links.filter(|(_, body)| is_searched(**body));
         searched.map(|(link, _)| link.name.clone()).collect()
     }
@@ -94,11 +103,11 @@ mod tests {
             (Reach::All, &all),
             (Reach::Hand, &hand),
         ] {
-            world.leave_out_idle(reach);
+            leave_out_idle(bodies_mut(&mut world), reach);
             assert_eq!(searched(&world), *expected, "{reach:?}");
         }
         let mut world = lonely();
-        world.leave_out_idle(Reach::Hand);
+        leave_out_idle(bodies_mut(&mut world), Reach::Hand);
         assert_eq!(searched(&world), all, "few pieces are cheap");
     }
 
@@ -111,14 +120,14 @@ mod tests {
             command.positions[joint] += 0.2;
         }
         for reach in [Reach::Hand, Reach::All] {
-            world.leave_out_idle(Reach::Hand);
-            (0..30).for_each(|_| world.step_with(&command, reach));
-            for body in &world.robot.bodies {
-                for handle in world.engine.bodies[*body].colliders() {
-                    let collider = &world.engine.colliders[*handle];
+            leave_out_idle(bodies_mut(&mut world), Reach::Hand);
+            (0..30).for_each(|_| step_with(&mut world, &command, reach));
+            for body in &bodies(&world).robot.bodies {
+                for handle in bodies(&world).physics.bodies[*body].colliders() {
+                    let collider = &bodies(&world).physics.colliders[*handle];
                     let on_link = collider.position_wrt_parent().expect("it is on a link");
-                    let expected =
-                        from_pose(world.engine.bodies[*body].position()) * from_pose(on_link);
+                    let expected = from_pose(bodies(&world).physics.bodies[*body].position())
+                        * from_pose(on_link);
                     let off = from_pose(collider.position()).translation.vector
                         - expected.translation.vector;
                     assert!(off.norm() < 1e-5, "{} m off", off.norm());

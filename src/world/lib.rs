@@ -1,14 +1,19 @@
 //! Simulates a `Scene`: the only crate that uses the physics engine.
 //!
+//! A [`World`] has four parts: the [`Engine`] steps the bodies, the [`Drive`] is the robot's side,
+//! [`Proximity`] decides what the robot can touch in a tick, and the [`Recorder`] measures.
+//!
 //! Never: decides the robot's actions, judges success, or attaches an object to the hand by a
 //! constraint, other than the seal of a suction cup, which breaks beyond its limits.
 
 mod assemble;
 mod attach;
+mod bodies;
 mod camera;
 mod clearance;
 mod contacts;
 mod departure;
+mod distances;
 mod drive;
 mod effective_mass;
 mod engine;
@@ -20,10 +25,12 @@ mod fresh;
 mod furniture;
 #[cfg(test)]
 mod gripper_tests;
+mod hollows;
 mod idle_links;
 mod link_pairs;
 mod motion;
 mod motor;
+mod motor_law;
 mod object;
 mod observe;
 mod odometry;
@@ -31,6 +38,7 @@ mod overlaps;
 mod ownership;
 mod patches;
 mod perturbation;
+mod physics;
 mod playback;
 mod proximity;
 mod quality;
@@ -45,18 +53,22 @@ mod shell;
 mod simulation;
 mod spans;
 mod suction;
+mod watch;
 
 pub use camera::DepthImage;
+pub use drive::{Command, Drive, Observation};
+pub use engine::Engine;
 pub use error::WorldError;
 pub use fault::{Fault, Perturbation, Poison};
 pub use fresh::narrow_phase;
 pub use overlaps::Overlap;
 pub use playback::{MotorGains, Playback, PlayedObject, PrincipalInertia, Setpoint, Surfaces};
+pub use proximity::Proximity;
 pub use reach::Shortcuts;
-pub use recorder::{Contact, Course, Record, Tracks};
+pub use recorder::{Contact, Course, Record, Recorder, Tracks};
 pub use sense::Sighting;
 pub use settle::Settling;
-pub use simulation::{Command, Observation, World, build, build_with};
+pub use simulation::{World, build, build_with};
 pub use suction::would_seal;
 
 pub use actcheck_geometry::{

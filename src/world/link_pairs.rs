@@ -10,10 +10,10 @@ use rapier3d::prelude::{
     SolverFlags,
 };
 
-use crate::World;
-use crate::engine::{FLOOR_GROUP, LENGTH_UNIT, Owner};
+use crate::bodies::Bodies;
+use crate::distances::{TOUCH_M, depth_of, gap_of_links};
 use crate::object::Object;
-use crate::robot_course::TOUCH_M;
+use crate::physics::{FLOOR_GROUP, LENGTH_UNIT, Owner};
 use actcheck_geometry::SURE_M;
 use actcheck_geometry::{from_vector, to_real};
 use parry3d::math::Vector;
@@ -33,15 +33,97 @@ pub(super) struct LinkPairs {
     pairs: BTreeSet<(usize, usize)>,
     /// Whether these links pass through each other too, because of a fault that is injected on
     /// purpose.
-    pub(super) pass: bool,
+    pass: bool,
     /// The whole that each part of an object belongs to, by their indices: nothing collides within
     /// a whole.
-    pub(super) wholes: BTreeMap<usize, usize>,
+    wholes: BTreeMap<usize, usize>,
     /// Duration of a step. Unit: seconds.
-    pub(super) step_secs: Real,
+    step_secs: Real,
 }
 
 impl LinkPairs {
+    /// Returns the pairs of links that are apart now and are not neighbours in the tree, and the
+    /// wholes of all parts.
+    pub(super) fn of(bodies: &Bodies) -> Self {
+        let links = &bodies.robot.model.links;
+        let solid: Vec<usize> = (0..links.len())
+            .filter(|idx| !links[*idx].solids.is_empty())
+            .collect();
+        let neighbours: BTreeSet<(usize, usize)> = solid
+            .iter()
+            .filter_map(|idx| {
+                bodies
+                    .robot
+                    .kinematics
+                    .solid_parent(*idx)
+                    .map(|parent| (parent, *idx))
+            })
+            .collect();
+        let pairs = solid.iter().flat_map(|first| {
+            solid
+                .iter()
+                .filter(move |second| *second > first)
+                .map(move |second| (*first, *second))
+        });
+        let passes = |pair: &(usize, usize)| {
+            neighbours.contains(pair) || bodies.robot.kinematics.pass(pair.0, pair.1)
+        };
+        let apart = |pair: &(usize, usize)| !passes(pair) && !meet(bodies, pair.0, pair.1);
+        let parts = bodies.objects.iter().enumerate();
+        let wholes = parts.filter_map(|(idx, object)| Some((idx, object.attached.as_ref()?.whole)));
+        Self {
+            pairs: pairs.filter(apart).collect(),
+            pass: false,
+            wholes: wholes.collect(),
+            step_secs: bodies.physics.integration_parameters.dt,
+        }
+    }
+
+    /// Puts links that pass through each other into collision groups that do, as far as there are
+    /// groups. The engine then never looks at their pairs, of which a gripper with many pieces has
+    /// thousands.
+    pub(super) fn group_links(&self, bodies: &mut Bodies) {
+        let numbers = self.groups(bodies.robot.bodies.len());
+        let group = |link: usize| Group::from_bits_retain(1 << numbers[link]);
+        let mut partners = vec![OTHERS; numbers.len()];
+        for (first, second) in self.iter() {
+            partners[first] |= group(second);
+            partners[second] |= group(first);
+        }
+        for (link, body) in bodies.robot.bodies.iter().enumerate() {
+            let Some(body) = bodies.physics.bodies.get(*body) else {
+                continue;
+            };
+            for handle in body.colliders() {
+                let Some(collider) = bodies.physics.colliders.get_mut(*handle) else {
+                    continue;
+                };
+                let floor = collider.collision_groups().filter & FLOOR_GROUP;
+                let groups = InteractionGroups::new(
+                    group(link),
+                    partners[link] | floor,
+                    InteractionTestMode::And,
+                );
+                collider.set_collision_groups(groups);
+            }
+        }
+    }
+
+    /// Lets all links pass through each other, or collide again.
+    pub(super) fn let_pass(&mut self, pass: bool) {
+        self.pass = pass;
+    }
+
+    /// Returns whether all links pass through each other.
+    pub(super) fn all_pass(&self) -> bool {
+        self.pass
+    }
+
+    /// Returns the whole that an object belongs to: itself, if it is not a part. By their indices.
+    pub(super) fn whole_of(&self, object: usize) -> usize {
+        self.wholes.get(&object).copied().unwrap_or(object)
+    }
+
     /// Returns the pairs in order.
     pub(super) fn iter(&self) -> impl Iterator<Item = (usize, usize)> {
         self.pairs.iter().copied()
@@ -79,8 +161,7 @@ impl PhysicsHooks for LinkPairs {
                 !self.pass && self.pairs.contains(&(a.min(b), a.max(b)))
             }
             (Some(Owner::Object(a)), Some(Owner::Object(b))) => {
-                let whole = |idx| self.wholes.get(&idx).copied().unwrap_or(idx);
-                whole(a) != whole(b)
+                self.whole_of(a) != self.whole_of(b)
             }
             _ => true,
         };
@@ -116,99 +197,41 @@ pub(super) const PREDICTION_M: f64 = 0.006;
 /// distance: it would enter others before its contact is found. Unit: m/s.
 const FAST_M_S: f64 = 1.0;
 
-impl World {
-    /// Sets the distance below which the engine prepares contacts in this tick.
-    pub(super) fn prepare_contacts(&mut self) {
-        if !self.robot.model.has_many_pieces() {
-            return;
-        }
-        let is_fast = |object: &Object| self.speed_of(object).is_some_and(|speed| speed > FAST_M_S);
-        let links = self
-            .robot
-            .bodies
-            .iter()
-            .filter_map(|body| self.engine.bodies.get(*body));
-        let is_link_fast = links
-            .map(|body| from_vector(body.linvel()).norm())
-            .any(|speed| speed > FAST_M_S);
-        let distance = match is_link_fast || self.objects.iter().any(is_fast) {
-            true => IntegrationParameters::default().normalized_prediction_distance / LENGTH_UNIT,
-            false => to_real(PREDICTION_M) / LENGTH_UNIT,
-        };
-        self.engine
-            .integration_parameters
-            .normalized_prediction_distance = distance;
+/// Sets the distance below which the engine prepares contacts in this tick.
+pub(super) fn prepare_contacts(bodies: &mut Bodies) {
+    if !bodies.robot.model.has_many_pieces() {
+        return;
     }
+    let is_fast = |object: &Object| {
+        bodies
+            .speed_of(object)
+            .is_some_and(|speed| speed > FAST_M_S)
+    };
+    let links = bodies
+        .robot
+        .bodies
+        .iter()
+        .filter_map(|body| bodies.physics.bodies.get(*body));
+    let is_link_fast = links
+        .map(|body| from_vector(body.linvel()).norm())
+        .any(|speed| speed > FAST_M_S);
+    let distance = match is_link_fast || bodies.objects.iter().any(is_fast) {
+        true => IntegrationParameters::default().normalized_prediction_distance / LENGTH_UNIT,
+        false => to_real(PREDICTION_M) / LENGTH_UNIT,
+    };
+    bodies
+        .physics
+        .integration_parameters
+        .normalized_prediction_distance = distance;
+}
 
-    /// Returns the pairs of links that are apart now and are not neighbours in the tree.
-    pub(super) fn find_link_pairs(&self) -> LinkPairs {
-        let links = &self.robot.model.links;
-        let solid: Vec<usize> = (0..links.len())
-            .filter(|idx| !links[*idx].solids.is_empty())
-            .collect();
-        let neighbours: BTreeSet<(usize, usize)> = solid
-            .iter()
-            .filter_map(|idx| {
-                self.robot
-                    .kinematics
-                    .solid_parent(*idx)
-                    .map(|parent| (parent, *idx))
-            })
-            .collect();
-        let pairs = solid.iter().flat_map(|first| {
-            solid
-                .iter()
-                .filter(move |second| *second > first)
-                .map(move |second| (*first, *second))
-        });
-        let passes = |pair: &(usize, usize)| {
-            neighbours.contains(pair) || self.robot.kinematics.pass(pair.0, pair.1)
-        };
-        let apart = |pair: &(usize, usize)| !passes(pair) && !self.meet(pair.0, pair.1);
-        LinkPairs {
-            pairs: pairs.filter(apart).collect(),
-            ..LinkPairs::default()
-        }
-    }
-
-    /// Returns whether two links overlap now, or touch each other and are not both of the hand,
-    /// whose fingers may be closed. With links that touch from the beginning, no tick would be
-    /// free.
-    fn meet(&self, first: usize, second: usize) -> bool {
-        let in_hand = self.robot.kinematics.are_of_hand(first, second);
-        self.depth_of(first, second) > TOUCH_M
-            || !in_hand && self.gap_of_links(first, second) <= TOUCH_M
-    }
-
-    /// Puts links that pass through each other into collision groups that do, as far as there are
-    /// groups. The engine then never looks at their pairs, of which a gripper with many pieces has
-    /// thousands.
-    pub(super) fn group_links(&mut self) {
-        let numbers = self.link_pairs.groups(self.robot.bodies.len());
-        let group = |link: usize| Group::from_bits_retain(1 << numbers[link]);
-        let mut partners = vec![OTHERS; numbers.len()];
-        for (first, second) in self.link_pairs.iter() {
-            partners[first] |= group(second);
-            partners[second] |= group(first);
-        }
-        for (link, body) in self.robot.bodies.iter().enumerate() {
-            let Some(body) = self.engine.bodies.get(*body) else {
-                continue;
-            };
-            for handle in body.colliders() {
-                let Some(collider) = self.engine.colliders.get_mut(*handle) else {
-                    continue;
-                };
-                let floor = collider.collision_groups().filter & FLOOR_GROUP;
-                let groups = InteractionGroups::new(
-                    group(link),
-                    partners[link] | floor,
-                    InteractionTestMode::And,
-                );
-                collider.set_collision_groups(groups);
-            }
-        }
-    }
+/// Returns whether two links overlap now, or touch each other and are not both of the hand,
+/// whose fingers may be closed. With links that touch from the beginning, no tick would be
+/// free.
+fn meet(bodies: &Bodies, first: usize, second: usize) -> bool {
+    let in_hand = bodies.robot.kinematics.are_of_hand(first, second);
+    depth_of(bodies, first, second) > TOUCH_M
+        || !in_hand && gap_of_links(bodies, first, second) <= TOUCH_M
 }
 
 #[cfg(test)]
@@ -216,6 +239,7 @@ mod tests {
     use super::*;
     use crate::gripper_tests::{hand, turning};
     use crate::robot::tests::alone;
+    use crate::simulation::tests::bodies;
     use actcheck_base::Source;
 
     /// The hand is 60 cm above the robot's root: on a block that reaches up to its fingers, or 1 mm
@@ -239,11 +263,12 @@ mod tests {
             profile = actcheck_config::robot::with_urdf(profile, Source::new("hand.urdf", text))
                 .expect("it is a URDF");
             let mut world = alone(profile);
-            let links = world.robot.model.links.iter();
+            let links = bodies(&world).robot.model.links.iter();
             let names: Vec<&str> = links.map(|link| link.name.as_str()).collect();
             let collides = |one: &str, other: &str| {
                 let mut pairs = world
-                    .link_pairs
+                    .engine()
+                    .link_pairs()
                     .iter()
                     .map(|(one, other)| [names[one], names[other]]);
                 pairs.any(|pair| pair == [one, other] || pair == [other, one])
@@ -261,9 +286,9 @@ mod tests {
             let hold = world.hold();
             (0..30).for_each(|_| world.step(&hold));
             assert!(
-                world.moved_freely(),
+                world.proximity().moved_freely(),
                 "{gap_m}: {:?}",
-                world.ticks_by_reach()
+                world.proximity().ticks_by_reach()
             );
         }
     }

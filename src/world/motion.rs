@@ -1,7 +1,8 @@
 //! The robot's measurements and commands over time, as data for policy learning.
 
-use crate::recorder::grain;
-use crate::{Command, World};
+use crate::bodies::Bodies;
+use crate::drive::{Command, Drive};
+use crate::engine::Engine;
 use actcheck_data::Motion;
 
 /// Positions, velocities and targets are rounded to multiples of this, for compression. Units:
@@ -9,6 +10,10 @@ use actcheck_data::Motion;
 const GRAIN: f64 = 1e-4;
 /// As [`GRAIN`], for efforts. Units: newtons or newton metres.
 const EFFORT_GRAIN: f64 = 0.01;
+
+pub(super) fn grain(value: f64, grain: f64) -> f32 {
+    ((value / grain).round() * grain) as f32
+}
 
 /// Records a [`Motion`].
 #[derive(Default)]
@@ -25,24 +30,22 @@ impl MotionMeter {
             None => self.told = Some(command.clone()),
         }
     }
-}
 
-impl World {
     /// Starts a new recording, with a command to hold the current state.
-    pub(super) fn begin_motion(&mut self) {
-        self.recorder.motion.rows.clear();
-        self.recorder.motion.told = Some(self.hold());
-        self.record_motion();
+    pub(super) fn begin(&mut self, engine: &Engine, drive: &Drive, secs: f64) {
+        self.rows.clear();
+        self.told = Some(drive.hold(engine));
+        self.record(engine, drive, secs);
     }
 
-    /// Records this moment.
-    pub(super) fn record_motion(&mut self) {
-        let Some(told) = &self.recorder.motion.told else {
+    /// Records this moment, at a time since the record began. Unit: seconds.
+    pub(super) fn record(&mut self, engine: &Engine, drive: &Drive, secs: f64) {
+        let Some(told) = &self.told else {
             return;
         };
-        let observed = self.observe();
-        let base = self.base_true();
-        let secs = self.recorder.secs_since_begin(self.recorder.n_ticks());
+        let observed = drive.observe(engine);
+        let bodies = engine.bodies();
+        let base = bodies.base_true();
         let mut row = vec![grain(secs, GRAIN), grain(observed.gripper_opening_m, GRAIN)];
         row.extend(
             observed
@@ -55,10 +58,10 @@ impl World {
         ]);
         row.extend(
             base.into_iter()
-                .chain(self.believed(base))
+                .chain(drive.believed(base))
                 .map(|value| grain(value, GRAIN)),
         );
-        let gripper = &self.robot.layout.gripper;
+        let gripper = &bodies.robot.layout.gripper;
         for (idx, position) in observed.positions.iter().enumerate() {
             let of = |values: &[f64]| values.get(idx).copied().unwrap_or(f64::NAN);
             let velocity = of(&observed.velocities);
@@ -72,12 +75,12 @@ impl World {
                 grain(target, GRAIN),
             ]);
         }
-        self.recorder.motion.rows.push(row);
+        self.rows.push(row);
     }
 
     /// Returns the motion recorded since the start.
-    pub(super) fn end_motion(&mut self) -> Motion {
-        let joints = self
+    pub(super) fn end(&mut self, bodies: &Bodies) -> Motion {
+        let joints = bodies
             .robot
             .model
             .joints
@@ -86,7 +89,7 @@ impl World {
             .collect();
         Motion {
             joints,
-            rows: std::mem::take(&mut self.recorder.motion.rows),
+            rows: std::mem::take(&mut self.rows),
         }
     }
 }

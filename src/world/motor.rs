@@ -3,7 +3,7 @@
 use rapier3d::prelude::{GenericJoint, JointAxis, MultibodyJointHandle, PhysicsWorld};
 
 use crate::assemble::WIDEST_RANGE;
-use crate::drive::{Law, State};
+use crate::motor_law::{Law, State};
 use actcheck_geometry::to_real;
 use actcheck_robot::Joint;
 
@@ -188,6 +188,7 @@ mod tests {
     use crate::Shortcuts;
     use crate::reach::Reach;
     use crate::robot::tests::lonely;
+    use crate::simulation::tests::{bodies, bodies_mut, step_with};
 
     /// A joint without inertia is the fastest: it follows its law at once.
     #[test]
@@ -203,7 +204,7 @@ mod tests {
                 .expect("it has fingers"),
         );
         for joint in [world.layout().arm[0], finger] {
-            let motor = &world.robot.motors[joint];
+            let motor = &bodies(&world).robot.motors[joint];
             for lag in [1e-4, 0.01, 0.3] {
                 let motor = crate::motor::Motor {
                     setpoint: lag,
@@ -232,7 +233,7 @@ mod tests {
     #[test]
     fn motors_as_springs_move_and_measure_as_the_equations_do() {
         let [mut springs, mut free] = [lonely(), lonely()];
-        springs.robot.is_springy = true;
+        bodies_mut(&mut springs).robot.is_springy = true;
         for world in [&mut springs, &mut free] {
             world.take_shortcuts(Shortcuts {
                 few_substeps: false,
@@ -248,7 +249,7 @@ mod tests {
                 command.positions[*joint] = from[*joint] + way * done * done * (3.0 - 2.0 * done);
             }
             for (world, reach) in [(&mut springs, Reach::All), (&mut free, Reach::Nothing)] {
-                world.step_with(&command, reach);
+                step_with(world, &command, reach);
                 assert_eq!(world.fault(), None);
             }
             let (one, other) = (springs.observe(), free.observe());

@@ -9,8 +9,7 @@ use rapier3d::prelude::{
 };
 
 use crate::attach::Attachment;
-use crate::engine::{LENGTH_UNIT, Owner, collider};
-use crate::furniture::slides;
+use crate::physics::{LENGTH_UNIT, Owner, collider};
 use crate::shell::{Hollow, hollows_of};
 use actcheck_data::{Inertia, ObjectModel, Part, Role, SceneObject};
 use actcheck_geometry::Ball;
@@ -43,6 +42,11 @@ pub(super) struct Object {
     pub(super) hollows: Vec<Hollow>,
     /// Its attachment to another object, if it is a part of it.
     pub(super) attached: Option<Attachment>,
+}
+
+/// Returns whether an object in this role slides when it is pushed: furniture that is not built in.
+fn slides(role: Role, built_in: bool) -> bool {
+    role == Role::Platform && !built_in
 }
 
 /// Adds one object with the shapes of its model.

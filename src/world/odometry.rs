@@ -7,8 +7,7 @@
 
 use nalgebra::Vector2;
 
-use crate::World;
-use actcheck_data::{ChoiceName, Choices, Odometry, PlanarAxis, Pose, WheelAxis};
+use actcheck_data::{ChoiceName, Choices, Odometry, PlanarAxis, Sensing, WheelAxis};
 
 /// Length of a stretch with constant wheel errors: distance plus rotation. Units: metres and
 /// radians.
@@ -42,78 +41,83 @@ struct Step {
     turn_rad: f64,
 }
 
-impl World {
+impl Tracker {
     /// Starts with the uncertainty of the initial localisation.
-    pub(super) fn begin_tracking(&mut self) {
-        let (place, heading) = (
-            self.sensing.localisation_noise_m,
-            self.sensing.heading_noise_rad,
-        );
-        self.tracker = Tracker {
+    pub(super) fn begin(sensing: &Sensing) -> Self {
+        let (place, heading) = (sensing.localisation_noise_m, sensing.heading_noise_rad);
+        Self {
             variances: [place * place, heading * heading],
-            ..Tracker::default()
-        };
+            ..Self::default()
+        }
     }
 
     /// Starts the next step at the current pose, after the base was moved without turning its
     /// wheels.
     pub(super) fn forget_way(&mut self) {
-        self.tracker.last = None;
+        self.last = None;
     }
 
-    /// Updates the pose estimate with the base's motion since the last call. Call it after every
-    /// tick.
-    pub fn track_base(&mut self, choices: &mut Choices) {
-        if self.sensing.odometry == Odometry::IDEAL || self.robot.layout.base.is_none() {
-            return;
+    /// Returns the believed pose after a motion of the base to `now` since the last call. Call it
+    /// after every tick. `believed` converts a true pose to the one that was believed so far.
+    /// Returns `None` if nothing changes this belief.
+    pub(super) fn track(
+        &mut self,
+        sensing: &Sensing,
+        now: [f64; 3],
+        believed: impl Fn([f64; 3]) -> [f64; 3],
+        tick_secs: f64,
+        choices: &mut Choices,
+    ) -> Option<[f64; 3]> {
+        let odometry = &sensing.odometry;
+        if *odometry == Odometry::IDEAL {
+            return None;
         }
-        let now = self.base_true();
-        let Some(last) = self.tracker.last.replace(now) else {
-            return;
-        };
+        let last = self.last.replace(now)?;
         let along = Vector2::new(now[0] - last[0], now[1] - last[1]);
         let step = Step {
             along,
             way_m: (along.x * along.x + along.y * along.y).sqrt(),
             turn_rad: now[2] - last[2],
         };
-        let mut believed = self.by_wheels(last, &step, choices);
-        let every_m = self.sensing.odometry.landmark_every_m;
-        if every_m > 0.0 && self.tracker.since_landmark_m >= every_m {
-            self.see_landmark(now, believed, choices);
+        let at = believed(last);
+        let mut believed = self.by_wheels(odometry, at, at[2] - last[2], &step, choices);
+        let every_m = odometry.landmark_every_m;
+        if every_m > 0.0 && self.since_landmark_m >= every_m {
+            self.see_landmark(odometry, now, believed, choices);
         }
-        let most = CORRECTION_SPEED * self.tick_secs();
-        for (belief, pending) in believed.iter_mut().zip(&mut self.tracker.pending) {
+        let most = CORRECTION_SPEED * tick_secs;
+        for (belief, pending) in believed.iter_mut().zip(&mut self.pending) {
             let change = pending.clamp(-most, most);
             *belief += change;
             *pending -= change;
         }
-        let [x, y, heading] = believed;
-        let truth = Pose::upright([now[0], now[1], 0.0], now[2]).to_isometry();
-        self.believed_from_true =
-            Pose::upright([x, y, 0.0], heading).to_isometry() * truth.inverse();
+        Some(believed)
     }
 
     /// Returns the believed pose after a step, by wheel odometry.
-    fn by_wheels(&mut self, last: [f64; 3], step: &Step, choices: &mut Choices) -> [f64; 3] {
-        let [x, y, heading] = self.believed(last);
-        let astray = heading - last[2];
-        let odometry = &self.sensing.odometry;
-        let tracker = &mut self.tracker;
-        tracker.left -= step.way_m + step.turn_rad.abs();
-        if tracker.left <= 0.0 && step.way_m + step.turn_rad.abs() > 0.0 {
+    fn by_wheels(
+        &mut self,
+        odometry: &Odometry,
+        at: [f64; 3],
+        astray: f64,
+        step: &Step,
+        choices: &mut Choices,
+    ) -> [f64; 3] {
+        let [x, y, heading] = at;
+        self.left -= step.way_m + step.turn_rad.abs();
+        if self.left <= 0.0 && step.way_m + step.turn_rad.abs() > 0.0 {
             let mut draw =
                 |axis: WheelAxis, sigma: f64| choices.normal(ChoiceName::Odometry(axis), sigma);
-            tracker.off = [
+            self.off = [
                 draw(WheelAxis::Along, odometry.drift),
                 draw(WheelAxis::Across, odometry.drift),
                 draw(WheelAxis::Turning, odometry.heading_drift),
                 draw(WheelAxis::Veering, odometry.heading_drift),
             ];
-            tracker.left = STRETCH;
+            self.left = STRETCH;
         }
-        tracker.grow(odometry, step);
-        let [along, across, turning, veering] = tracker.off;
+        self.grow(odometry, step);
+        let [along, across, turning, veering] = self.off;
         let measured =
             step.along * (1.0 + along) + Vector2::new(-step.along.y, step.along.x) * across;
         let (sin, cos) = (libm::sin(astray), libm::cos(astray));
@@ -125,27 +129,29 @@ impl World {
     }
 
     /// Computes the correction by a landmark, to be applied gradually.
-    fn see_landmark(&mut self, truth: [f64; 3], believed: [f64; 3], choices: &mut Choices) {
-        let odometry = &self.sensing.odometry;
+    fn see_landmark(
+        &mut self,
+        odometry: &Odometry,
+        truth: [f64; 3],
+        believed: [f64; 3],
+        choices: &mut Choices,
+    ) {
         let noise = [
             odometry.landmark_noise_m,
             odometry.landmark_noise_m,
             odometry.landmark_noise_rad,
         ];
-        let tracker = &mut self.tracker;
-        tracker.since_landmark_m = 0.0;
+        self.since_landmark_m = 0.0;
         let shares = [
-            share(&mut tracker.variances[0], odometry.landmark_noise_m),
-            share(&mut tracker.variances[1], odometry.landmark_noise_rad),
+            share(&mut self.variances[0], odometry.landmark_noise_m),
+            share(&mut self.variances[1], odometry.landmark_noise_rad),
         ];
         for (axis, name) in PlanarAxis::ALL.into_iter().enumerate() {
             let seen = truth[axis] + choices.normal(ChoiceName::Landmark(name), noise[axis]);
-            tracker.pending[axis] = shares[axis / 2] * (seen - believed[axis]);
+            self.pending[axis] = shares[axis / 2] * (seen - believed[axis]);
         }
     }
-}
 
-impl Tracker {
     /// Increases the variances with the distance. Stretches are independent; a heading error
     /// displaces the position in proportion to the distance.
     fn grow(&mut self, odometry: &Odometry, step: &Step) {

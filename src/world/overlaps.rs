@@ -6,10 +6,10 @@ use nalgebra::Vector3;
 use parry3d::query::contact;
 use rapier3d::prelude::Collider;
 
-use crate::World;
-use crate::clearance::{Boxed, gap};
-use crate::engine::FLOOR_GROUP;
+use crate::bodies::Bodies;
+use crate::distances::{Boxed, are_balls_apart, gap};
 use crate::object::Object;
+use crate::physics::FLOOR_GROUP;
 use actcheck_geometry::{SeparationOutcome, SolidPair};
 use actcheck_geometry::{from_pose, to_vector};
 
@@ -60,61 +60,59 @@ impl fmt::Display for Overlap {
     }
 }
 
-impl World {
-    /// Returns the links of the robot that are inside furniture, objects or the floor, the deepest
-    /// first. Things that touch do not count, nor do those that the engine lets pass through each
-    /// other, such as wheels and the floor.
-    pub fn overlaps(&self) -> Vec<Overlap> {
-        let mut found = Vec::new();
-        for (link, body) in self.robot.bodies.iter().enumerate() {
-            let solids: Vec<Boxed<'_>> = self.boxed(*body).collect();
-            let is_mount = self.robot.joints_to(link).next().is_none();
-            let mut note = |thing: &str, depth_m: f64, is_fixed: bool| {
-                let allowed_m = if is_mount && is_fixed {
-                    MOUNT_M
-                } else {
-                    TOUCH_M
-                };
-                if depth_m > allowed_m {
-                    let link = self.robot.model.links[link].name.clone();
-                    found.push(Overlap {
-                        link,
-                        thing: thing.to_owned(),
-                        depth_m,
-                    });
-                }
+/// Returns the links of the robot that are inside furniture, objects or the floor, the deepest
+/// first. Things that touch do not count, nor do those that the engine lets pass through each
+/// other, such as wheels and the floor.
+pub(super) fn overlaps(bodies: &Bodies) -> Vec<Overlap> {
+    let mut found = Vec::new();
+    for (link, body) in bodies.robot.bodies.iter().enumerate() {
+        let solids: Vec<Boxed<'_>> = bodies.boxed(*body).collect();
+        let is_mount = bodies.robot.joints_to(link).next().is_none();
+        let mut note = |thing: &str, depth_m: f64, is_fixed: bool| {
+            let allowed_m = if is_mount && is_fixed {
+                MOUNT_M
+            } else {
+                TOUCH_M
             };
-            let in_floor = solids
-                .iter()
-                .filter(|(solid, _)| meets_floor(solid))
-                .map(|(solid, _)| -lowest_m(solid));
-            note("floor", in_floor.fold(0.0, f64::max), true);
-            for object in self
-                .objects
-                .iter()
-                .filter(|object| !self.are_balls_apart(link, object, 0.0))
-            {
-                note(&object.id, self.depth_in(&solids, object), object.fixed);
+            if depth_m > allowed_m {
+                let link = bodies.robot.model.links[link].name.clone();
+                found.push(Overlap {
+                    link,
+                    thing: thing.to_owned(),
+                    depth_m,
+                });
             }
+        };
+        let in_floor = solids
+            .iter()
+            .filter(|(solid, _)| meets_floor(solid))
+            .map(|(solid, _)| -lowest_m(solid));
+        note("floor", in_floor.fold(0.0, f64::max), true);
+        for object in bodies
+            .objects
+            .iter()
+            .filter(|object| !are_balls_apart(bodies, link, object, 0.0))
+        {
+            note(&object.id, depth_in(bodies, &solids, object), object.fixed);
         }
-        found.sort_by(|a, b| b.depth_m.total_cmp(&a.depth_m));
-        found
     }
+    found.sort_by(|a, b| b.depth_m.total_cmp(&a.depth_m));
+    found
+}
 
-    /// How deep solids are in an object. Unit: metres.
-    fn depth_in(&self, solids: &[Boxed<'_>], object: &Object) -> f64 {
-        let mut deepest: f64 = 0.0;
-        for (other, its_box) in self.boxed(object.body) {
-            for (solid, own_box) in solids {
-                if gap(own_box, &its_box) <= 0.0
-                    && solid.collision_groups().test(other.collision_groups())
-                {
-                    deepest = deepest.max(depth_m(solid, other));
-                }
+/// How deep solids are in an object. Unit: metres.
+fn depth_in(bodies: &Bodies, solids: &[Boxed<'_>], object: &Object) -> f64 {
+    let mut deepest: f64 = 0.0;
+    for (other, its_box) in bodies.boxed(object.body) {
+        for (solid, own_box) in solids {
+            if gap(own_box, &its_box) <= 0.0
+                && solid.collision_groups().test(other.collision_groups())
+            {
+                deepest = deepest.max(depth_m(solid, other));
             }
         }
-        deepest
     }
+    deepest
 }
 
 fn meets_floor(solid: &Collider) -> bool {

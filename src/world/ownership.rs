@@ -455,11 +455,12 @@ mod tests {
     use super::*;
     use crate::reach::Reach;
     use crate::robot::tests::lonely;
+    use crate::simulation::tests::{bodies, step_with};
 
     #[test]
     fn the_hand_is_the_link_that_carries_both_fingers() {
         let world = lonely();
-        let robot = &world.robot;
+        let robot = &bodies(&world).robot;
         let hand = robot.hand.as_ref().expect("the shipped robot has a hand");
         let names = |links: &dyn Fn(usize) -> bool| -> Vec<&str> {
             (0..robot.bodies.len())
@@ -512,7 +513,7 @@ mod tests {
                 (&mut changing, order[tick / 2 % order.len()]),
                 (&mut whole, Reach::All),
             ] {
-                world.step_with(&command, reach);
+                step_with(world, &command, reach);
                 assert_eq!(world.fault(), None);
             }
             let (one, other) = (changing.observe(), whole.observe());
@@ -520,9 +521,12 @@ mod tests {
                 let off = (one.positions[idx] - other.positions[idx]).abs();
                 assert!(off < most, "{} is {off} off in tick {tick}", joint.name);
             }
-            let poses = changing.robot.kinematics.links(&changing.robot.positions);
-            for (body, pose) in changing.robot.bodies.iter().zip(&poses) {
-                let at = from_pose(changing.engine.bodies[*body].position());
+            let poses = bodies(&changing)
+                .robot
+                .kinematics
+                .links(&bodies(&changing).robot.positions);
+            for (body, pose) in bodies(&changing).robot.bodies.iter().zip(&poses) {
+                let at = from_pose(bodies(&changing).physics.bodies[*body].position());
                 assert!(
                     (at.translation.vector - pose.translation.vector).norm() < 1e-4,
                     "tick {tick}"

@@ -10,13 +10,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rapier3d::prelude::{
-    ContactPair, GenericJoint, ImpulseJointHandle, JointAxesMask, JointAxis, MotorModel, RigidBody,
+    ContactPair, GenericJoint, ImpulseJointHandle, JointAxesMask, JointAxis, MotorModel,
     RigidBodyHandle,
 };
 
-use crate::World;
+use crate::bodies::Bodies;
 use crate::contacts::{has_solved, impulse_of, solved};
-use crate::engine::Owner;
+use crate::physics::Owner;
 use crate::reach::Reach;
 use actcheck_geometry::{from_pose, from_vector, to_pose, to_real};
 
@@ -36,7 +36,7 @@ const DAMPING: f32 = 1e4;
 
 /// The friction of one area.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Patch {
+struct Patch {
     joint: ImpulseJointHandle,
 }
 
@@ -111,142 +111,61 @@ impl Press {
     }
 }
 
-impl World {
+/// The friction of all areas in contact, by the owners of the two sides.
+#[derive(Debug, Default)]
+pub(super) struct Patches {
+    patches: BTreeMap<(Owner, Owner), Patch>,
+}
+
+impl Patches {
     /// Sets the friction of all areas in contact for the next tick, by the forces of the last step,
     /// and notes whether the hand carries much.
-    pub(super) fn rub(&mut self, reach: Reach) {
-        self.robot.is_loaded = false;
+    pub(super) fn rub(&mut self, bodies: &mut Bodies, reach: Reach) {
+        bodies.robot.is_loaded = false;
         if reach == Reach::Nothing {
             return;
         }
-        let presses = self.presses();
-        self.robot.is_loaded = self.carried_kg(presses.keys()) > self.robot.most_carried_kg;
-        let per_second = f64::from(self.engine.integration_parameters.inv_dt());
+        let presses = self.presses(bodies);
+        bodies.robot.is_loaded = carried_kg(bodies, presses.keys()) > bodies.robot.most_carried_kg;
+        let per_second = f64::from(bodies.physics.integration_parameters.inv_dt());
         let mut left = std::mem::take(&mut self.patches);
         for (pair, press) in &presses {
             let known = left.remove(pair);
-            let Some((frame, limits)) = self.limits(*pair, press, known.is_some()) else {
-                self.remove_patch(known);
+            let Some((frame, limits)) = limits(bodies, *pair, press, known.is_some()) else {
+                remove_patch(bodies, known);
                 continue;
             };
             let limits = limits.map(|limit| limit * per_second);
-            if let Some(patch) = self.set_patch(known, press.bodies, &frame, limits) {
+            if let Some(patch) = set_patch(bodies, known, press.bodies, &frame, limits) {
                 self.patches.insert(*pair, patch);
             }
         }
         for (pair, patch) in left {
-            if self.both_rest(pair) {
+            if both_rest(bodies, pair) {
                 self.patches.insert(pair, patch);
             } else {
-                self.remove_patch(Some(patch));
+                remove_patch(bodies, Some(patch));
             }
         }
-    }
-
-    fn remove_patch(&mut self, patch: Option<Patch>) {
-        if let Some(patch) = patch {
-            self.engine.impulse_joints.remove(patch.joint, false);
-        }
-    }
-
-    /// Returns the frame of an area, with x along its normal and y along the axis about which the
-    /// second thing rolls, and its largest impulses about x, and about y and z. Returns `None` if
-    /// nothing is to be added.
-    fn limits(
-        &self,
-        pair: (Owner, Owner),
-        press: &Press,
-        known: bool,
-    ) -> Option<(Isometry3<f64>, [f64; 2])> {
-        let [one, other] = press.bodies.map(|handle| self.engine.bodies.get(handle));
-        let normal = press.normal.try_normalize(1e-12)?;
-        let turn = from_vector(other?.angvel())
-            - one.map_or_else(Vector3::zeros, |body| from_vector(body.angvel()));
-        let rolls = turn - normal * turn.dot(&normal);
-        let limits = match pair.0 {
-            Owner::Link(link) if self.robot.is_pad(link) => [press.grip * press.lacks_m(), 0.0],
-            _ if known || rolls.norm() > ROLLS_RAD_S => [0.0, press.pressed * ROLLING_LEVER_M],
-            _ => return None,
-        };
-        if limits == [0.0, 0.0] {
-            return None;
-        }
-        // At least one of two axes is far from the normal.
-        let any = if normal.x.abs() < 0.8 {
-            Vector3::x()
-        } else {
-            Vector3::y()
-        };
-        let along = rolls
-            .try_normalize(1e-6)
-            .or_else(|| (any - normal * any.dot(&normal)).try_normalize(1e-6))?;
-        let axes = Matrix3::from_columns(&[normal, along, normal.cross(&along)]);
-        let turned = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
-        Some((
-            Isometry3::from_parts(Translation3::from(press.at.coords), turned),
-            limits,
-        ))
-    }
-
-    /// Sets the largest torques of an area about x, and about y and z of its frame.
-    fn set_patch(
-        &mut self,
-        known: Option<Patch>,
-        bodies: [RigidBodyHandle; 2],
-        frame: &Isometry3<f64>,
-        [twist, rolling]: [f64; 2],
-    ) -> Option<Patch> {
-        let [one, other] = bodies.map(|handle| {
-            self.engine
-                .bodies
-                .get(handle)
-                .map(|body| from_pose(body.position()))
-        });
-        let mut data = GenericJoint::new(JointAxesMask::empty());
-        data.set_local_frame1(to_pose(&(one?.inverse() * frame)));
-        data.set_local_frame2(to_pose(&(other?.inverse() * frame)));
-        for (axis, limit) in [
-            (JointAxis::AngX, twist),
-            (JointAxis::AngY, rolling),
-            (JointAxis::AngZ, rolling),
-        ] {
-            if limit > 0.0 {
-                data.set_motor_model(axis, MotorModel::ForceBased);
-                data.set_motor(axis, 0.0, 0.0, 0.0, DAMPING);
-                data.set_motor_max_force(axis, to_real(limit));
-            }
-        }
-        if let Some(patch) = known
-            && let Some(joint) = self.engine.impulse_joints.get_mut(patch.joint, false)
-        {
-            joint.data = data;
-            return Some(patch);
-        }
-        Some(Patch {
-            joint: self
-                .engine
-                .impulse_joints
-                .insert(bodies[0], bodies[1], data, false),
-        })
     }
 
     /// Returns the things that press the moving objects, by pairs with such an object at the second
     /// place.
-    fn presses(&self) -> BTreeMap<(Owner, Owner), Press> {
+    fn presses(&self, bodies: &Bodies) -> BTreeMap<(Owner, Owner), Press> {
         let mut found: BTreeMap<(Owner, Owner), Press> = BTreeMap::new();
-        for pair in self
-            .engine
+        for pair in bodies
+            .physics
             .narrow_phase
             .contact_pairs()
             .filter(|pair| has_solved(pair))
         {
-            let Some((owners, bodies, turned)) = self.moving_pair(pair) else {
+            let Some((owners, handles, turned)) = moving_pair(bodies, pair) else {
                 continue;
             };
-            if !self.may_rub(owners, bodies) {
+            if !self.may_rub(bodies, owners, handles) {
                 continue;
             }
-            let Some(one) = self.engine.colliders.get(pair.collider1) else {
+            let Some(one) = bodies.physics.colliders.get(pair.collider1) else {
                 continue;
             };
             let one = from_pose(one.position());
@@ -261,7 +180,7 @@ impl World {
                     let whole = impulse_of(point, &normal) * sign;
                     let press = found
                         .entry(owners)
-                        .or_insert_with(|| Press::new(bodies, at));
+                        .or_insert_with(|| Press::new(handles, at));
                     press.add(
                         at,
                         &(normal * sign),
@@ -277,9 +196,15 @@ impl World {
 
     /// Returns whether two bodies need a look at their contact: links of the robot, and things that
     /// may roll.
-    fn may_rub(&self, owners: (Owner, Owner), bodies: [RigidBodyHandle; 2]) -> bool {
-        let [one, other] = bodies.map(|handle| {
-            self.engine
+    fn may_rub(
+        &self,
+        bodies: &Bodies,
+        owners: (Owner, Owner),
+        handles: [RigidBodyHandle; 2],
+    ) -> bool {
+        let [one, other] = handles.map(|handle| {
+            bodies
+                .physics
                 .bodies
                 .get(handle)
                 .map(|body| from_vector(body.angvel()))
@@ -290,72 +215,154 @@ impl World {
                 .zip(other)
                 .is_some_and(|(one, other)| (other - one).norm() > ROLLS_RAD_S)
     }
+}
 
-    /// Returns the owners and bodies of a contact of an object that moves, which comes second, and
-    /// whether the engine has them the other way round.
-    fn moving_pair(
-        &self,
-        pair: &ContactPair,
-    ) -> Option<((Owner, Owner), [RigidBodyHandle; 2], bool)> {
-        let colliders = [
-            self.engine.colliders.get(pair.collider1)?,
-            self.engine.colliders.get(pair.collider2)?,
-        ];
-        let owners = colliders.map(|collider| Owner::from_tag(collider.user_data));
-        let turned = match owners {
-            [Owner::Object(one), Owner::Object(other)] => {
-                self.is_fixed(other) || one > other && !self.is_fixed(one)
-            }
-            [Owner::Object(_), _] => true,
-            [_, Owner::Object(_)] => false,
-            _ => return None,
-        };
-        let [first, second] = if turned {
-            [owners[1], owners[0]]
-        } else {
-            owners
-        };
-        if self.both_rest((first, second)) {
-            return None;
-        }
-        let body = |owner: Owner| match owner {
-            // The floor has no body of its own.
-            Owner::Floor => self.floor,
-            Owner::Object(idx) => self.objects[idx].body,
-            Owner::Link(link) => self.robot.bodies[link],
-        };
-        Some(((first, second), [body(first), body(second)], turned))
+fn remove_patch(bodies: &mut Bodies, patch: Option<Patch>) {
+    if let Some(patch) = patch {
+        bodies.physics.impulse_joints.remove(patch.joint, false);
     }
+}
 
-    /// Returns whether the objects of a pair rest.
-    fn both_rest(&self, pair: (Owner, Owner)) -> bool {
-        let rests = |owner: Owner| match owner {
-            Owner::Object(idx) => self.rests(&self.objects[idx]),
-            Owner::Floor | Owner::Link(_) => true,
-        };
-        rests(pair.0) && rests(pair.1)
+/// Returns the frame of an area, with x along its normal and y along the axis about which the
+/// second thing rolls, and its largest impulses about x, and about y and z. Returns `None` if
+/// nothing is to be added.
+fn limits(
+    bodies: &Bodies,
+    pair: (Owner, Owner),
+    press: &Press,
+    known: bool,
+) -> Option<(Isometry3<f64>, [f64; 2])> {
+    let [one, other] = press.bodies.map(|handle| bodies.physics.bodies.get(handle));
+    let normal = press.normal.try_normalize(1e-12)?;
+    let turn = from_vector(other?.angvel())
+        - one.map_or_else(Vector3::zeros, |body| from_vector(body.angvel()));
+    let rolls = turn - normal * turn.dot(&normal);
+    let limits = match pair.0 {
+        Owner::Link(link) if bodies.robot.is_pad(link) => [press.grip * press.lacks_m(), 0.0],
+        _ if known || rolls.norm() > ROLLS_RAD_S => [0.0, press.pressed * ROLLING_LEVER_M],
+        _ => return None,
+    };
+    if limits == [0.0, 0.0] {
+        return None;
     }
+    // At least one of two axes is far from the normal.
+    let any = if normal.x.abs() < 0.8 {
+        Vector3::x()
+    } else {
+        Vector3::y()
+    };
+    let along = rolls
+        .try_normalize(1e-6)
+        .or_else(|| (any - normal * any.dot(&normal)).try_normalize(1e-6))?;
+    let axes = Matrix3::from_columns(&[normal, along, normal.cross(&along)]);
+    let turned = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
+    Some((
+        Isometry3::from_parts(Translation3::from(press.at.coords), turned),
+        limits,
+    ))
+}
 
-    fn is_fixed(&self, object: usize) -> bool {
-        self.engine
+/// Sets the largest torques of an area about x, and about y and z of its frame.
+fn set_patch(
+    bodies: &mut Bodies,
+    known: Option<Patch>,
+    handles: [RigidBodyHandle; 2],
+    frame: &Isometry3<f64>,
+    [twist, rolling]: [f64; 2],
+) -> Option<Patch> {
+    let [one, other] = handles.map(|handle| {
+        bodies
+            .physics
             .bodies
-            .get(self.objects[object].body)
-            .is_none_or(RigidBody::is_fixed)
+            .get(handle)
+            .map(|body| from_pose(body.position()))
+    });
+    let mut data = GenericJoint::new(JointAxesMask::empty());
+    data.set_local_frame1(to_pose(&(one?.inverse() * frame)));
+    data.set_local_frame2(to_pose(&(other?.inverse() * frame)));
+    for (axis, limit) in [
+        (JointAxis::AngX, twist),
+        (JointAxis::AngY, rolling),
+        (JointAxis::AngZ, rolling),
+    ] {
+        if limit > 0.0 {
+            data.set_motor_model(axis, MotorModel::ForceBased);
+            data.set_motor(axis, 0.0, 0.0, 0.0, DAMPING);
+            data.set_motor_max_force(axis, to_real(limit));
+        }
     }
+    if let Some(patch) = known
+        && let Some(joint) = bodies.physics.impulse_joints.get_mut(patch.joint, false)
+    {
+        joint.data = data;
+        return Some(patch);
+    }
+    Some(Patch {
+        joint: bodies
+            .physics
+            .impulse_joints
+            .insert(handles[0], handles[1], data, false),
+    })
+}
 
-    /// Returns the mass of the objects that the hand touches. Unit: kilograms.
-    fn carried_kg<'a>(&self, pairs: impl Iterator<Item = &'a (Owner, Owner)>) -> f64 {
-        let Some(hand) = &self.robot.hand else {
-            return 0.0;
-        };
-        let touched = pairs.filter_map(|pair| match pair {
-            (Owner::Link(link), Owner::Object(idx)) if hand.has(*link) => Some(*idx),
-            _ => None,
-        });
-        touched
-            .collect::<BTreeSet<usize>>()
-            .into_iter()
-            .map(|idx| self.objects[idx].mass_kg)
-            .sum()
+/// Returns the owners and bodies of a contact of an object that moves, which comes second, and
+/// whether the engine has them the other way round.
+fn moving_pair(
+    bodies: &Bodies,
+    pair: &ContactPair,
+) -> Option<((Owner, Owner), [RigidBodyHandle; 2], bool)> {
+    let colliders = [
+        bodies.physics.colliders.get(pair.collider1)?,
+        bodies.physics.colliders.get(pair.collider2)?,
+    ];
+    let owners = colliders.map(|collider| Owner::from_tag(collider.user_data));
+    let is_fixed = |idx: usize| bodies.is_fixed(&bodies.objects[idx]);
+    let turned = match owners {
+        [Owner::Object(one), Owner::Object(other)] => {
+            is_fixed(other) || one > other && !is_fixed(one)
+        }
+        [Owner::Object(_), _] => true,
+        [_, Owner::Object(_)] => false,
+        _ => return None,
+    };
+    let [first, second] = if turned {
+        [owners[1], owners[0]]
+    } else {
+        owners
+    };
+    if both_rest(bodies, (first, second)) {
+        return None;
     }
+    let body = |owner: Owner| match owner {
+        // The floor has no body of its own.
+        Owner::Floor => bodies.floor,
+        Owner::Object(idx) => bodies.objects[idx].body,
+        Owner::Link(link) => bodies.robot.bodies[link],
+    };
+    Some(((first, second), [body(first), body(second)], turned))
+}
+
+/// Returns whether the objects of a pair rest.
+fn both_rest(bodies: &Bodies, pair: (Owner, Owner)) -> bool {
+    let rests = |owner: Owner| match owner {
+        Owner::Object(idx) => bodies.rests(&bodies.objects[idx]),
+        Owner::Floor | Owner::Link(_) => true,
+    };
+    rests(pair.0) && rests(pair.1)
+}
+
+/// Returns the mass of the objects that the hand touches. Unit: kilograms.
+fn carried_kg<'a>(bodies: &Bodies, pairs: impl Iterator<Item = &'a (Owner, Owner)>) -> f64 {
+    let Some(hand) = &bodies.robot.hand else {
+        return 0.0;
+    };
+    let touched = pairs.filter_map(|pair| match pair {
+        (Owner::Link(link), Owner::Object(idx)) if hand.has(*link) => Some(*idx),
+        _ => None,
+    });
+    touched
+        .collect::<BTreeSet<usize>>()
+        .into_iter()
+        .map(|idx| bodies.objects[idx].mass_kg)
+        .sum()
 }

@@ -1,84 +1,61 @@
-//! External disturbances of objects and of the robot.
+//! External disturbances of objects.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use crate::{Perturbation, World};
-use actcheck_data::Pose;
+use crate::bodies::Bodies;
+use crate::fault::{Perturbation, Poison};
 use actcheck_geometry::{to_pose, to_real, to_vector};
 
 /// Gap below an object that is laid down, so that it drops into contact instead of being pushed
 /// out. Unit: metres.
 const DROP_M: f64 = 2e-3;
 
-impl World {
-    /// Applies a perturbation to an object. Returns `false` if there is no such object.
-    pub fn perturb(&mut self, id: &str, perturbation: Perturbation) -> bool {
-        let Some(object) = self.objects.iter().find(|object| object.id == id) else {
-            return false;
-        };
-        let pose = match perturbation {
-            Perturbation::Pose(pose) => pose.to_isometry(),
-            Perturbation::Fall => lying(&self.pose_of(object), object.model.size_m),
-            Perturbation::Friction(friction) => {
-                let colliders = self
-                    .engine
-                    .bodies
-                    .get(object.body)
-                    .map(rapier3d::prelude::RigidBody::colliders);
-                for handle in colliders.unwrap_or_default() {
-                    if let Some(collider) = self.engine.colliders.get_mut(*handle) {
-                        collider.set_friction(to_real(friction));
-                    }
+/// Applies a perturbation to an object. Returns `false` if there is no such object.
+pub(super) fn perturb(bodies: &mut Bodies, id: &str, perturbation: Perturbation) -> bool {
+    let Some(object) = bodies.objects.iter().find(|object| object.id == id) else {
+        return false;
+    };
+    let pose = match perturbation {
+        Perturbation::Pose(pose) => pose.to_isometry(),
+        Perturbation::Fall => lying(&bodies.pose_of(object), object.model.size_m),
+        Perturbation::Friction(friction) => {
+            let colliders = bodies
+                .physics
+                .bodies
+                .get(object.body)
+                .map(rapier3d::prelude::RigidBody::colliders);
+            for handle in colliders.unwrap_or_default() {
+                if let Some(collider) = bodies.physics.colliders.get_mut(*handle) {
+                    collider.set_friction(to_real(friction));
                 }
-                return true;
             }
-        };
-        let Some(body) = self.engine.bodies.get_mut(object.body) else {
-            return false;
-        };
-        body.set_position(to_pose(&pose), true);
-        body.set_linvel(to_vector(&Vector3::zeros()), true);
-        body.set_angvel(to_vector(&Vector3::zeros()), true);
-        true
-    }
-}
-
-impl World {
-    /// Moves the robot to another pose (x, y, heading) without changing its pose estimate. Returns
-    /// `false` if its base is fixed.
-    pub fn kidnap(&mut self, to: [f64; 3]) -> bool {
-        if self.robot.layout.base.is_none() {
-            return false;
+            return true;
         }
-        let from = self.base_true();
-        let [x, y, heading] = self.believed(from);
-        self.robot.shift_base(
-            &mut self.engine,
-            [0, 1, 2].map(|axis| to[axis] - from[axis]),
-        );
-        // The odometry does not register the move.
-        let (believed, truth) = (
-            Pose::upright([x, y, 0.0], heading),
-            Pose::upright([to[0], to[1], 0.0], to[2]),
-        );
-        self.believed_from_true = believed.to_isometry() * truth.to_isometry().inverse();
-        self.forget_way();
-        true
-    }
+    };
+    let Some(body) = bodies.physics.bodies.get_mut(object.body) else {
+        return false;
+    };
+    body.set_position(to_pose(&pose), true);
+    body.set_linvel(to_vector(&Vector3::zeros()), true);
+    body.set_angvel(to_vector(&Vector3::zeros()), true);
+    true
 }
 
-impl World {
-    /// Lets the robot's links pass through each other, or collide again. Their depth in each other
-    /// is still measured.
-    pub fn let_links_pass(&mut self, pass: bool) {
-        self.link_pairs.pass = pass;
+/// Disturbs the state of an object, by its index. Returns `false` if it has no body.
+pub(super) fn poison(bodies: &mut Bodies, object: usize, poison: Poison) -> bool {
+    let Some(body) = bodies.physics.bodies.get_mut(bodies.objects[object].body) else {
+        return false;
+    };
+    match poison {
+        Poison::NotFinite => body.set_linvel(to_vector(&Vector3::repeat(f64::NAN)), true),
+        Poison::Velocity(velocity) => body.set_linvel(to_vector(&Vector3::from(velocity)), true),
+        Poison::Teleport(position) => {
+            body.set_translation(to_vector(&Vector3::from(position)), true)
+        }
+        // Only sensors see it.
+        Poison::Decoy(_) => {}
     }
-
-    /// Lets the motor of a joint, by its index, give a multiple of its largest effort. Fingers
-    /// excepted.
-    pub fn overdrive(&mut self, joint: usize, strength: f64) {
-        self.robot.overdrive(joint, strength);
-    }
+    true
 }
 
 /// Returns the pose of a standing object after it is laid on its side; its middle stays above the
@@ -97,6 +74,7 @@ fn lying(standing: &Isometry3<f64>, [width, _, height]: [f64; 3]) -> Isometry3<f
 #[cfg(test)]
 mod tests {
     use super::*;
+    use actcheck_data::Pose;
 
     #[test]
     fn a_fallen_object_lies_above_its_former_position() {

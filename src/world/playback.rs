@@ -6,10 +6,13 @@ use nalgebra::Vector3;
 
 use rapier3d::prelude::RigidBodyHandle;
 
-use crate::World;
-use crate::engine::FLOOR_FRICTION;
+use crate::bodies::Bodies;
+use crate::engine::Engine;
 use crate::motor::Motor;
+use crate::object::Object;
 use crate::patches::{PAD_LEVER_M, ROLLING_LEVER_M};
+use crate::physics::FLOOR_FRICTION;
+use crate::robot::SimulatedRobot;
 use actcheck_data::Pose;
 use actcheck_geometry::from_vector;
 
@@ -126,29 +129,23 @@ impl Motor {
     }
 }
 
-impl World {
-    /// Starts a playback at the present state, which ends with [`World::take_playback`].
-    pub fn keep_playback(&mut self) {
-        let objects = (0..self.objects.len())
-            .map(|idx| self.played(idx))
-            .collect();
-        let robot = &self.robot;
-        self.recorder.playback = Some(Playback {
-            tick_secs: self.tick_secs(),
+impl Playback {
+    /// Starts at the present state.
+    pub(super) fn begin(engine: &Engine) -> Self {
+        let bodies = engine.bodies();
+        let robot = &bodies.robot;
+        let poses = robot.kinematics.links(&robot.positions);
+        Self {
+            tick_secs: bodies.tick_secs(),
             motors: robot.motors.iter().map(Motor::gains).collect(),
             start: robot.positions.clone(),
-            links: robot
-                .kinematics
-                .links(&robot.positions)
-                .iter()
-                .map(Pose::from_isometry)
-                .collect(),
-            link_pairs: self.link_pairs.iter().collect(),
+            links: poses.iter().map(Pose::from_isometry).collect(),
+            link_pairs: engine.link_pairs().iter().collect(),
             off_floor: robot.off_floor.clone(),
             link_friction: robot
                 .bodies
                 .iter()
-                .map(|body| self.friction_of(*body))
+                .map(|body| friction_of(bodies, *body))
                 .collect(),
             pads: (0..robot.bodies.len())
                 .map(|link| robot.is_pad(link))
@@ -158,58 +155,55 @@ impl World {
                 pad_lever_m: PAD_LEVER_M,
                 rolling_lever_m: ROLLING_LEVER_M,
             },
-            objects,
+            objects: bodies
+                .objects
+                .iter()
+                .map(|object| played(bodies, object))
+                .collect(),
             ticks: Vec::new(),
-        });
-    }
-
-    /// Returns the playback since [`World::keep_playback`]; `None` without it.
-    pub fn take_playback(&mut self) -> Option<Playback> {
-        self.recorder.playback.take()
+        }
     }
 
     /// Adds the setpoints of the tick that ends.
-    pub(super) fn record_playback(&mut self) {
-        if let Some(playback) = &mut self.recorder.playback {
-            let setpoints = self.robot.motors.iter().map(Motor::setpoint);
-            playback.ticks.push(setpoints.collect());
-        }
+    pub(super) fn record(&mut self, robot: &SimulatedRobot) {
+        self.ticks
+            .push(robot.motors.iter().map(Motor::setpoint).collect());
     }
+}
 
-    /// The friction coefficient of a link's shapes; 0 without shapes.
-    fn friction_of(&self, body: RigidBodyHandle) -> f64 {
-        self.colliders_of(body)
-            .next()
-            .map_or(0.0, |collider| f64::from(collider.friction()))
-    }
+/// The friction coefficient of a link's shapes; 0 without shapes.
+fn friction_of(bodies: &Bodies, link: RigidBodyHandle) -> f64 {
+    bodies
+        .colliders_of(link)
+        .next()
+        .map_or(0.0, |collider| f64::from(collider.friction()))
+}
 
-    fn played(&self, idx: usize) -> PlayedObject {
-        let object = &self.objects[idx];
-        let body = self.engine.bodies.get(object.body);
-        let moving = body.filter(|body| !body.is_fixed());
-        let velocities = moving.map_or([Vector3::zeros(); 2], |body| {
-            let linear = body.velocity_at_point(body.translation());
-            [from_vector(linear), from_vector(body.angvel())]
-        });
-        let inertia = moving.map(|body| {
-            let properties = &body.mass_properties().local_mprops;
-            let turn = properties.principal_inertia_local_frame.to_array();
-            PrincipalInertia {
-                mass_kg: object.mass_kg,
-                frame: Pose {
-                    position: from_vector(properties.local_com).into(),
-                    rotation: turn.map(f64::from),
-                },
-                moments: from_vector(properties.principal_inertia()).into(),
-            }
-        });
-        PlayedObject {
-            id: object.id.clone(),
-            pose: Pose::from_isometry(&self.pose_of(object)),
-            linear_velocity: velocities[0].into(),
-            angular_velocity: velocities[1].into(),
-            inertia,
-            joint_position: self.part_position(object),
+fn played(bodies: &Bodies, object: &Object) -> PlayedObject {
+    let body = bodies.physics.bodies.get(object.body);
+    let moving = body.filter(|body| !body.is_fixed());
+    let velocities = moving.map_or([Vector3::zeros(); 2], |body| {
+        let linear = body.velocity_at_point(body.translation());
+        [from_vector(linear), from_vector(body.angvel())]
+    });
+    let inertia = moving.map(|body| {
+        let properties = &body.mass_properties().local_mprops;
+        let turn = properties.principal_inertia_local_frame.to_array();
+        PrincipalInertia {
+            mass_kg: object.mass_kg,
+            frame: Pose {
+                position: from_vector(properties.local_com).into(),
+                rotation: turn.map(f64::from),
+            },
+            moments: from_vector(properties.principal_inertia()).into(),
         }
+    });
+    PlayedObject {
+        id: object.id.clone(),
+        pose: Pose::from_isometry(&bodies.pose_of(object)),
+        linear_velocity: velocities[0].into(),
+        angular_velocity: velocities[1].into(),
+        inertia,
+        joint_position: bodies.part_position(object),
     }
 }

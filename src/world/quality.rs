@@ -2,8 +2,9 @@
 //!
 //! Reads the engine's state after a tick without changing it.
 
-use crate::World;
-use crate::engine::Owner;
+use crate::bodies::Bodies;
+use crate::contacts::Touches;
+use crate::physics::Owner;
 use actcheck_data::Quality;
 use actcheck_robot::GRAVITY;
 
@@ -29,9 +30,15 @@ impl QualityMeter {
         }
     }
 
+    /// Records the contacts of a tick, and the energy of each object that the robot could not push.
+    pub(super) fn record(&mut self, touches: &Touches, energies: Vec<Option<f64>>) {
+        let depths = touches.values().map(|touch| touch.depth_m);
+        self.tick(depths.fold(0.0, f64::max), energies);
+    }
+
     /// Records a tick: the deepest contact, and the energy of each object that the robot could not
     /// push.
-    pub(super) fn tick(&mut self, deepest_m: f64, energies: Vec<Option<f64>>) {
+    fn tick(&mut self, deepest_m: f64, energies: Vec<Option<f64>>) {
         self.deepest_m = self.deepest_m.max(deepest_m);
         let changes = self
             .before
@@ -45,76 +52,65 @@ impl QualityMeter {
     }
 }
 
-impl World {
-    /// Returns the worst errors of physics since the first record began.
-    pub fn quality(&self) -> Quality {
-        self.recorder.quality.quality()
-    }
+/// Returns the energy of each object, in scene order; `None` for static objects and those the
+/// robot could push. `sealed` is the object at its suction cup. Unit: joules.
+pub(super) fn free_energies(bodies: &Bodies, sealed: Option<usize>) -> Vec<Option<f64>> {
+    let reached = reached_by_robot(bodies, sealed);
+    let objects = bodies.objects.iter().zip(reached);
+    objects
+        .map(|(object, reached)| {
+            let body = bodies
+                .physics
+                .bodies
+                .get(object.body)
+                .filter(|body| !reached && !body.is_fixed())?;
+            let height_m = f64::from(body.center_of_mass().z);
+            Some(f64::from(body.kinetic_energy()) + object.mass_kg * GRAVITY * height_m)
+        })
+        .collect()
+}
 
-    /// Returns the energy of each object, in scene order; `None` for static objects and those the
-    /// robot could push. Unit: joules.
-    pub(super) fn free_energies(&self) -> Vec<Option<f64>> {
-        let reached = self.reached_by_robot();
-        let objects = self.objects.iter().zip(reached);
-        objects
-            .map(|(object, reached)| {
-                let body = self
-                    .engine
-                    .bodies
-                    .get(object.body)
-                    .filter(|body| !reached && !body.is_fixed())?;
-                let height_m = f64::from(body.center_of_mass().z);
-                Some(f64::from(body.kinetic_energy()) + object.mass_kg * GRAVITY * height_m)
-            })
-            .collect()
-    }
-
-    /// Marks the objects that the robot could have pushed, directly or through others. Compares
-    /// bounding boxes, so that it includes contacts that began and ended within a tick.
-    fn reached_by_robot(&self) -> Vec<bool> {
-        let mut reached = vec![false; self.objects.len()];
-        let mut pairs: Vec<(usize, usize)> = Vec::new();
-        for pair in self.engine.narrow_phase.contact_pairs() {
-            let owner = |handle| {
-                self.engine
-                    .colliders
-                    .get(handle)
-                    .map(|collider| Owner::from_tag(collider.user_data))
-            };
-            match (owner(pair.collider1), owner(pair.collider2)) {
-                (Some(Owner::Link(_)), Some(Owner::Object(idx)))
-                | (Some(Owner::Object(idx)), Some(Owner::Link(_))) => {
-                    reached[idx] = true;
-                }
-                (Some(Owner::Object(first)), Some(Owner::Object(second))) => {
-                    pairs.push((first, second))
-                }
-                _ => {}
+/// Marks the objects that the robot could have pushed, directly or through others. Compares
+/// bounding boxes, so that it includes contacts that began and ended within a tick.
+fn reached_by_robot(bodies: &Bodies, sealed: Option<usize>) -> Vec<bool> {
+    let mut reached = vec![false; bodies.objects.len()];
+    let mut pairs: Vec<(usize, usize)> = Vec::new();
+    for pair in bodies.physics.narrow_phase.contact_pairs() {
+        let owner = |handle| {
+            bodies
+                .physics
+                .colliders
+                .get(handle)
+                .map(|collider| Owner::from_tag(collider.user_data))
+        };
+        match (owner(pair.collider1), owner(pair.collider2)) {
+            (Some(Owner::Link(_)), Some(Owner::Object(idx)))
+            | (Some(Owner::Object(idx)), Some(Owner::Link(_))) => {
+                reached[idx] = true;
             }
+            (Some(Owner::Object(first)), Some(Owner::Object(second))) => {
+                pairs.push((first, second))
+            }
+            _ => {}
         }
-        if let Some(sealed) = self.sealed() {
-            reached[sealed] = true;
-        }
-        // Static objects do not transmit a push.
-        let fixed: Vec<bool> = self
-            .objects
-            .iter()
-            .map(|object| {
-                self.engine
-                    .bodies
-                    .get(object.body)
-                    .is_none_or(rapier3d::prelude::RigidBody::is_fixed)
-            })
-            .collect();
-        pairs.retain(|(first, second)| !fixed[*first] && !fixed[*second]);
-        while let Some((first, second)) = pairs
-            .iter()
-            .find(|(first, second)| reached[*first] != reached[*second])
-        {
-            (reached[*first], reached[*second]) = (true, true);
-        }
-        reached
     }
+    if let Some(sealed) = sealed {
+        reached[sealed] = true;
+    }
+    // Static objects do not transmit a push.
+    let fixed: Vec<bool> = bodies
+        .objects
+        .iter()
+        .map(|object| bodies.is_fixed(object))
+        .collect();
+    pairs.retain(|(first, second)| !fixed[*first] && !fixed[*second]);
+    while let Some((first, second)) = pairs
+        .iter()
+        .find(|(first, second)| reached[*first] != reached[*second])
+    {
+        (reached[*first], reached[*second]) = (true, true);
+    }
+    reached
 }
 
 #[cfg(test)]

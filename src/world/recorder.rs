@@ -5,17 +5,20 @@ use std::collections::BTreeMap;
 use nalgebra::{Isometry3, Vector3};
 use rapier3d::prelude::RigidBodyHandle;
 
-use crate::World;
+use crate::bodies::Bodies;
 use crate::clearance::ClearanceMeter;
-use crate::contacts::Touch;
-use crate::engine::Owner;
-use crate::motion::MotionMeter;
+use crate::contacts::Touches;
+use crate::drive::{Command, Drive};
+use crate::engine::Engine;
+use crate::motion::{MotionMeter, grain};
+use crate::physics::Owner;
 use crate::playback::Playback;
-use crate::quality::QualityMeter;
+use crate::quality::{QualityMeter, free_energies};
+use crate::reach::Reach;
 use crate::robot_course::RobotMeter;
 use crate::samples::SampleMeter;
 use actcheck_base::Digest;
-use actcheck_data::{Pose, RobotCourse};
+use actcheck_data::{Pose, Quality, RobotCourse};
 use actcheck_geometry::{from_pose, from_vector};
 
 /// Time between two frames. Unit: seconds. Enough for images and replays, and it keeps traces
@@ -58,7 +61,7 @@ pub struct Course {
     pub max_displacement_m: f64,
 }
 
-/// The data recorded since [`World::begin_record`].
+/// The data recorded since [`World::begin_record`](crate::World::begin_record).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
     /// Contacts, sorted by start and pair.
@@ -102,6 +105,42 @@ impl Episode {
     }
 }
 
+/// A body that can move.
+struct Tracked {
+    /// Its name in traces.
+    name: String,
+    body: RigidBodyHandle,
+    /// Whether it is furniture, which slides when it is pushed hard.
+    is_furniture: bool,
+}
+
+/// Returns the bodies that can move: objects, then links with shapes.
+fn tracked(bodies: &Bodies) -> Vec<Tracked> {
+    let objects = bodies
+        .objects
+        .iter()
+        .filter(|object| !object.fixed || object.slides)
+        .map(|object| Tracked {
+            name: object.id.clone(),
+            body: object.body,
+            is_furniture: object.slides,
+        });
+    let links = bodies
+        .robot
+        .model
+        .links
+        .iter()
+        .zip(&bodies.robot.bodies)
+        .skip(1)
+        .filter(|(link, _)| !link.solids.is_empty())
+        .map(|(link, body)| Tracked {
+            name: format!("robot/{}", link.name),
+            body: *body,
+            is_furniture: false,
+        });
+    objects.chain(links).collect()
+}
+
 /// The recorder of a world.
 pub struct Recorder {
     digest: Digest,
@@ -109,25 +148,26 @@ pub struct Recorder {
     ticks_per_frame: u64,
     n_ticks: u64,
     began: u64,
-    tracked: Vec<(String, RigidBodyHandle)>,
+    tracked: Vec<Tracked>,
     rows: Vec<Vec<f32>>,
     begin_poses: Vec<Isometry3<f64>>,
     extremes: Vec<[f64; 4]>,
     base: Option<[[f64; 2]; 2]>,
     open: BTreeMap<(Owner, Owner), Episode>,
     closed: Vec<((Owner, Owner), Episode)>,
-    pub(super) quality: QualityMeter,
-    pub(super) robot: RobotMeter,
-    pub(super) motion: MotionMeter,
-    pub(super) clearance: ClearanceMeter,
-    pub(super) samples: SampleMeter,
+    quality: QualityMeter,
+    robot: RobotMeter,
+    motion: MotionMeter,
+    clearance: ClearanceMeter,
+    samples: SampleMeter,
     /// The playback for another engine, if it is kept.
-    pub(super) playback: Option<Playback>,
+    playback: Option<Playback>,
 }
 
 impl Recorder {
-    /// Creates an empty recorder for `n_objects` objects and the tracked bodies.
-    pub fn new(n_objects: usize, tracked: Vec<(String, RigidBodyHandle)>, tick_secs: f64) -> Self {
+    /// Creates an empty recorder.
+    pub(super) fn new(bodies: &Bodies) -> Self {
+        let tick_secs = bodies.tick_secs();
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -140,10 +180,10 @@ impl Recorder {
             ticks_per_frame,
             n_ticks: 0,
             began: 0,
-            tracked,
+            tracked: tracked(bodies),
             rows: Vec::new(),
             begin_poses: Vec::new(),
-            extremes: vec![[0.0; 4]; n_objects],
+            extremes: vec![[0.0; 4]; bodies.objects.len()],
             base: None,
             open: BTreeMap::new(),
             closed: Vec::new(),
@@ -156,50 +196,43 @@ impl Recorder {
         }
     }
 
-    /// Returns the number of control ticks since the world was built.
-    pub(super) fn n_ticks(&self) -> u64 {
-        self.n_ticks
-    }
-
     /// Returns the time of a tick since the record began. Unit: seconds.
     pub(super) fn secs_since_begin(&self, tick: u64) -> f64 {
         tick.saturating_sub(self.began) as f64 * self.tick_secs
     }
-}
 
-impl World {
     /// Begins a record: resets contacts and extremes; frames continue.
-    pub fn begin_record(&mut self) {
-        let poses = self
+    pub(super) fn begin(&mut self, engine: &Engine, drive: &Drive) {
+        let bodies = engine.bodies();
+        self.began = self.n_ticks;
+        self.begin_poses = bodies
             .objects
             .iter()
-            .map(|object| self.pose_of(object))
+            .map(|object| bodies.pose_of(object))
             .collect();
-        let recorder = &mut self.recorder;
-        recorder.began = recorder.n_ticks;
-        recorder.begin_poses = poses;
-        recorder.extremes = vec![[0.0; 4]; self.objects.len()];
-        recorder.base = None;
-        recorder.open.clear();
-        recorder.closed.clear();
-        if recorder.rows.is_empty() {
-            self.frame();
+        self.extremes = vec![[0.0; 4]; bodies.objects.len()];
+        self.base = None;
+        self.open.clear();
+        self.closed.clear();
+        if self.rows.is_empty() {
+            self.frame(bodies);
         }
-        self.begin_robot_course();
-        self.begin_clearance();
-        self.begin_motion();
-        self.begin_samples();
+        self.robot.begin(bodies.robot.model.joints.len());
+        self.clearance.begin(bodies);
+        self.motion
+            .begin(engine, drive, self.secs_since_begin(self.n_ticks));
+        self.samples = SampleMeter::begin(engine, drive, &engine.touches());
     }
 
     /// Ends the record and returns it.
-    pub fn end_record(&mut self) -> Record {
-        let mut closed = std::mem::take(&mut self.recorder.closed);
-        closed.extend(std::mem::take(&mut self.recorder.open));
-        let secs = |tick: u64| self.recorder.secs_since_begin(tick);
+    pub(super) fn end(&mut self, bodies: &Bodies) -> Record {
+        let mut closed = std::mem::take(&mut self.closed);
+        closed.extend(std::mem::take(&mut self.open));
+        let secs = |tick: u64| self.secs_since_begin(tick);
         let mut contacts: Vec<Contact> = closed
             .iter()
             .map(|((first, second), episode)| {
-                let mut pair = [self.name_of(*first), self.name_of(*second)];
+                let mut pair = [bodies.name_of(*first), bodies.name_of(*second)];
                 pair.sort();
                 // A contact is detected at the end of its tick.
                 let start_secs = secs(episode.start.saturating_sub(1));
@@ -223,7 +256,7 @@ impl World {
                 .total_cmp(&b.start_secs)
                 .then_with(|| a.pair.cmp(&b.pair))
         });
-        let courses = self.objects.iter().zip(&self.recorder.extremes);
+        let courses = bodies.objects.iter().zip(&self.extremes);
         let courses = courses
             .map(
                 |(object, [max_tilt_rad, max_speed, max_rise_m, max_displacement_m])| Course {
@@ -235,17 +268,19 @@ impl World {
                 },
             )
             .collect();
-        let samples = self.end_samples();
+        let samples = self.samples.end(bodies);
         Record {
             contacts,
             courses,
-            base: self.recorder.base,
+            base: self.base,
             robot: RobotCourse {
-                clearances: self.clearances(),
-                motion: self.end_motion(),
+                clearances: self.clearance.clearances(bodies),
+                motion: self.motion.end(bodies),
                 intervals: samples.intervals(),
                 samples,
-                ..self.end_robot_course()
+                ..self
+                    .robot
+                    .course(bodies, |tick| self.secs_since_begin(tick))
             },
         }
     }
@@ -253,24 +288,19 @@ impl World {
     /// Returns the poses of all moving bodies since the first record began. Furniture is among them
     /// if it moved.
     pub fn tracks(&self) -> Tracks {
-        let Recorder { tracked, rows, .. } = &self.recorder;
+        let Self { tracked, rows, .. } = self;
         let poses =
             |row: &[f32], idx: usize| row.get(7 * idx..7 * idx + 7).unwrap_or_default().to_vec();
         let stayed = |idx: &usize| {
             rows.windows(2)
                 .all(|pair| poses(&pair[0], *idx) == poses(&pair[1], *idx))
         };
-        let is_furniture = |name: &str| {
-            self.objects
-                .iter()
-                .any(|object| object.slides && object.id == name)
-        };
         let kept: Vec<usize> = (0..tracked.len())
-            .filter(|idx| !(is_furniture(&tracked[*idx].0) && stayed(idx)))
+            .filter(|idx| !(tracked[*idx].is_furniture && stayed(idx)))
             .collect();
         Tracks {
-            period_secs: self.recorder.ticks_per_frame as f64 * self.recorder.tick_secs,
-            names: kept.iter().map(|idx| tracked[*idx].0.clone()).collect(),
+            period_secs: self.ticks_per_frame as f64 * self.tick_secs,
+            names: kept.iter().map(|idx| tracked[*idx].name.clone()).collect(),
             rows: rows
                 .iter()
                 .map(|row| kept.iter().flat_map(|idx| poses(row, *idx)).collect())
@@ -278,67 +308,80 @@ impl World {
         }
     }
 
+    /// Returns the worst errors of physics since the first record began.
+    pub fn quality(&self) -> Quality {
+        self.quality.quality()
+    }
+
     /// Returns a digest over the bits of all states so far.
     pub fn state_digest(&self) -> String {
-        self.recorder.digest.clone().finish()
+        self.digest.clone().finish()
     }
 
-    /// Returns the name of an owner in contacts.
-    pub(super) fn name_of(&self, owner: Owner) -> String {
-        match owner {
-            Owner::Floor => "floor".to_owned(),
-            Owner::Object(idx) => self
-                .objects
-                .get(idx)
-                .map_or_else(String::new, |object| object.id.clone()),
-            Owner::Link(idx) => {
-                let link = self
-                    .robot
-                    .model
-                    .links
-                    .get(idx)
-                    .map_or("", |link| link.name.as_str());
-                format!("robot/{link}")
-            }
+    /// Starts a playback for another engine.
+    pub(super) fn keep_playback(&mut self, engine: &Engine) {
+        self.playback = Some(Playback::begin(engine));
+    }
+
+    /// Returns the playback since its start; `None` without it.
+    pub(super) fn take_playback(&mut self) -> Option<Playback> {
+        self.playback.take()
+    }
+
+    /// Stores a command, which is part of the record.
+    pub(super) fn tell(&mut self, command: &Command) {
+        self.motion.tell(command);
+    }
+
+    /// Records the state after a tick in which the robot could touch this. Returns the contacts, or
+    /// `None` before the first record begins.
+    pub(super) fn record(
+        &mut self,
+        engine: &Engine,
+        drive: &Drive,
+        reach: Reach,
+    ) -> Option<Touches> {
+        let bodies = engine.bodies();
+        self.n_ticks += 1;
+        self.digest_state(bodies);
+        if let Some(playback) = &mut self.playback {
+            playback.record(&bodies.robot);
+        }
+        if self.rows.is_empty() {
+            return None;
+        }
+        self.record_extremes(bodies);
+        self.record_base(bodies);
+        let touches = engine.touches();
+        self.record_contacts(&touches);
+        self.quality
+            .record(&touches, free_energies(bodies, engine.sealed()));
+        self.robot.record(engine, reach, self.n_ticks, &touches);
+        self.samples.record(engine, drive, &touches);
+        self.clearance.record_touched(&touches);
+        Some(touches)
+    }
+
+    /// Records what is recorded only with each frame, if this tick has one.
+    pub(super) fn record_frame(&mut self, engine: &Engine, drive: &Drive) {
+        if (self.n_ticks - self.began).is_multiple_of(self.ticks_per_frame) {
+            self.frame(engine.bodies());
+            self.clearance.record(engine.bodies());
+            self.motion
+                .record(engine, drive, self.secs_since_begin(self.n_ticks));
         }
     }
 
-    /// Records the state after a tick.
-    pub(super) fn record(&mut self) {
-        self.recorder.n_ticks += 1;
-        self.record_playback();
-        self.digest_state();
-        let recording = !self.recorder.rows.is_empty();
-        if recording {
-            self.record_extremes();
-            self.record_base();
-            let touches = self.touches();
-            self.record_contacts(&touches);
-            self.record_robot(&touches);
-            self.record_samples(&touches);
-            self.record_touched(&touches);
-            self.record_motions(&touches);
-            self.move_furniture(&touches);
-            if (self.recorder.n_ticks - self.recorder.began)
-                .is_multiple_of(self.recorder.ticks_per_frame)
-            {
-                self.frame();
-                self.record_clearance();
-                self.record_motion();
-            }
-        }
-    }
-
-    fn digest_state(&mut self) {
-        let handles = self
+    fn digest_state(&mut self, bodies: &Bodies) {
+        let handles = bodies
             .objects
             .iter()
             .map(|object| object.body)
-            .chain(self.robot.bodies.iter().copied());
+            .chain(bodies.robot.bodies.iter().copied());
         let mut bits: Vec<f32> =
-            Vec::with_capacity(13 * (self.objects.len() + self.robot.bodies.len()));
+            Vec::with_capacity(13 * (bodies.objects.len() + bodies.robot.bodies.len()));
         for handle in handles {
-            let Some(body) = self.engine.bodies.get(handle) else {
+            let Some(body) = bodies.physics.bodies.get(handle) else {
                 continue;
             };
             bits.extend(body.translation().to_array());
@@ -346,12 +389,12 @@ impl World {
             bits.extend(body.linvel().to_array());
             bits.extend(body.angvel().to_array());
         }
-        self.recorder.digest.update_bits(&bits);
+        self.digest.update_bits(&bits);
     }
 
-    fn record_extremes(&mut self) {
-        for (idx, object) in self.objects.iter().enumerate() {
-            let Some(body) = self.engine.bodies.get(object.body) else {
+    fn record_extremes(&mut self, bodies: &Bodies) {
+        for (idx, object) in bodies.objects.iter().enumerate() {
+            let Some(body) = bodies.physics.bodies.get(object.body) else {
                 continue;
             };
             if body.is_fixed() {
@@ -359,40 +402,34 @@ impl World {
             }
             let pose = from_pose(body.position());
             let way: Vector3<f64> =
-                pose.translation.vector - self.recorder.begin_poses[idx].translation.vector;
+                pose.translation.vector - self.begin_poses[idx].translation.vector;
             let speed = from_vector(body.velocity_at_point(body.translation())).norm();
             let now = [Pose::from_isometry(&pose).tilt(), speed, way.z, way.norm()];
-            for (extreme, value) in self.recorder.extremes[idx].iter_mut().zip(now) {
+            for (extreme, value) in self.extremes[idx].iter_mut().zip(now) {
                 *extreme = extreme.max(value);
             }
         }
     }
 
-    fn record_base(&mut self) {
-        if self.robot.layout.base.is_none() {
+    fn record_base(&mut self, bodies: &Bodies) {
+        if bodies.robot.layout.base.is_none() {
             return;
         }
-        let [x, y, _] = self.base_true();
-        let [low, high] = self.recorder.base.get_or_insert([[x, y], [x, y]]);
+        let [x, y, _] = bodies.base_true();
+        let [low, high] = self.base.get_or_insert([[x, y], [x, y]]);
         (*low, *high) = (
             [low[0].min(x), low[1].min(y)],
             [high[0].max(x), high[1].max(y)],
         );
     }
 
-    fn record_contacts(&mut self, touches: &BTreeMap<(Owner, Owner), Touch>) {
-        let now = self.recorder.n_ticks;
-        let patience = SAME_CONTACT_SECS / self.recorder.tick_secs;
-        let mut deepest_m = 0.0f64;
+    fn record_contacts(&mut self, touches: &Touches) {
+        let now = self.n_ticks;
+        let patience = SAME_CONTACT_SECS / self.tick_secs;
         for (pair, touch) in touches {
-            deepest_m = deepest_m.max(touch.depth_m);
-            let episode = self
-                .recorder
-                .open
-                .entry(*pair)
-                .or_insert(Episode::begin(now));
+            let episode = self.open.entry(*pair).or_insert(Episode::begin(now));
             if (now - episode.latest) as f64 > patience {
-                self.recorder.closed.push((*pair, *episode));
+                self.closed.push((*pair, *episode));
                 *episode = Episode::begin(now);
             }
             episode.latest = now;
@@ -400,28 +437,18 @@ impl World {
                 (episode.max_force_n, episode.point_m) = (touch.normal_n, touch.point_m);
             }
         }
-        let energies = self.free_energies();
-        self.recorder.quality.tick(deepest_m, energies);
     }
 
-    fn frame(&mut self) {
-        let mut row = Vec::with_capacity(7 * self.recorder.tracked.len());
-        for (_, handle) in &self.recorder.tracked {
-            let Some(body) = self.engine.bodies.get(*handle) else {
+    fn frame(&mut self, bodies: &Bodies) {
+        let mut row = Vec::with_capacity(7 * self.tracked.len());
+        for Tracked { body, .. } in &self.tracked {
+            let Some(body) = bodies.physics.bodies.get(*body) else {
                 continue;
             };
             let Pose { position, rotation } = Pose::from_isometry(&from_pose(body.position()));
             row.extend(position.map(|value| grain(value, FRAME_GRAIN_M)));
             row.extend(rotation.map(|value| grain(value, FRAME_GRAIN_TURN)));
         }
-        self.recorder.rows.push(row);
+        self.rows.push(row);
     }
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "frames are kept in 32 bits"
-)]
-pub(super) fn grain(value: f64, grain: f64) -> f32 {
-    ((value / grain).round() * grain) as f32
 }

@@ -6,10 +6,10 @@ use parry3d::bounding_volume::BoundingSphere;
 use rapier3d::prelude::{MultibodyJointHandle, PhysicsWorld, RigidBody, RigidBodyHandle};
 
 use crate::assemble::{insert_joints, insert_links, links_on_floor};
-use crate::drive::{Law, State};
-use crate::effective_mass::{CARRIED_SHARE, LIGHT_KG};
+use crate::effective_mass::{CARRIED_SHARE, LIGHT_KG, least_effective_mass_kg};
 use crate::free_motion::Equations;
 use crate::motor::Motor;
+use crate::motor_law::{Law, State};
 use crate::ownership::{Hand, Ownership};
 use crate::{Kinematics, WorldError};
 use actcheck_data::{JointState, RobotProfile, RobotStart};
@@ -145,7 +145,7 @@ impl SimulatedRobot {
             push_on_hand: Twist::ZERO,
             equations: None,
         };
-        let effective_kg = robot.least_effective_mass_kg();
+        let effective_kg = least_effective_mass_kg(&robot);
         robot.is_light = effective_kg.is_some_and(|mass_kg| mass_kg < LIGHT_KG);
         robot.most_carried_kg = CARRIED_SHARE * effective_kg.unwrap_or(0.0);
         robot.is_springy = robot.is_light || model.has_many_pieces();
@@ -412,7 +412,9 @@ pub(super) mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::bodies::Bodies;
     use crate::gripper_tests::checked;
+    use crate::simulation::tests::{bodies, bodies_mut, tick};
     use crate::{World, build, ik};
     use actcheck_base::Files;
     use actcheck_data::{Camera, Choices, Odometry, Physics, Scene, Sensing};
@@ -480,13 +482,13 @@ pub(super) mod tests {
         let mut choices = Choices::random(3, 0);
         for _ in 0..20 {
             let positions = posture(&world, &mut choices);
-            let robot = &mut world.robot;
+            let Bodies { robot, physics, .. } = bodies_mut(&mut world);
             robot.positions = positions;
-            robot.put_state(&mut world.engine);
-            robot.take_state(&world.engine);
+            robot.put_state(physics);
+            robot.take_state(physics);
             let poses = robot.kinematics.links(&robot.positions);
             for (body, pose) in robot.bodies.iter().zip(&poses) {
-                let simulated = from_pose(world.engine.bodies[*body].position());
+                let simulated = from_pose(physics.bodies[*body].position());
                 assert!((simulated.translation.vector - pose.translation.vector).norm() < 1e-5);
                 assert!(simulated.rotation.angle_to(&pose.rotation) < 2e-3);
             }
@@ -539,7 +541,7 @@ pub(super) mod tests {
         let base = world.layout().base.expect("it drives")[0];
         let (joint, mass) = (
             world.kinematics().joints()[base].clone(),
-            world.robot.model.links[base + 1..].iter(),
+            bodies(&world).robot.model.links[base + 1..].iter(),
         );
         let mass: f64 = mass.map(|link| link.mass).sum();
         let force = 0.25 * mass;
@@ -573,7 +575,7 @@ pub(super) mod tests {
     #[test]
     fn joints_with_strong_friction_keep_up_with_their_targets() {
         let with_friction = |damping: f64| {
-            let profile = lonely().robot.profile.as_ref().clone();
+            let profile = bodies(&lonely()).robot.profile.as_ref().clone();
             let limit = r#"effort="50" velocity="1.5"/>"#;
             let (before, after) = profile
                 .urdf
@@ -626,8 +628,8 @@ pub(super) mod tests {
             let joint = world.layout().arm[1];
             let command = world.hold();
             world.step(&command);
-            spoil(&mut world.robot, joint);
-            world.tick();
+            spoil(&mut bodies_mut(&mut world).robot, joint);
+            tick(&mut world);
             let name = world.kinematics().joints()[joint].name.clone();
             assert_eq!(world.fault(), Some(&crate::Fault::Joint(name)), "{idx}");
             world.step(&command);
@@ -636,7 +638,7 @@ pub(super) mod tests {
 
     #[test]
     fn a_profile_that_names_a_missing_joint_is_refused_with_help() {
-        let mut profile = lonely().robot.profile.as_ref().clone();
+        let mut profile = bodies(&lonely()).robot.profile.as_ref().clone();
         profile.arm_joints[1] = "arm_flx_joint".to_owned();
         let refused = checked(&profile)
             .expect_err("the joint is missing")

@@ -3,33 +3,30 @@
 //! Self-collisions are measured by the forces between links, and from their shapes and poses: links
 //! that pass through each other because of an injected fault have no forces.
 
-use actcheck_data::{HeldCourse, JointCourse, Pose, RobotCourse, SelfCollision, SelfPress};
 use std::collections::BTreeMap;
 
-use nalgebra::{Isometry3, Point3};
-use parry3d::bounding_volume::BoundingSphere;
-use parry3d::query::contact;
-use rapier3d::prelude::{Collider, RigidBodyHandle};
+use nalgebra::Isometry3;
 
-use crate::World;
-use crate::contacts::Touch;
-use crate::engine::{Owner, SHELL};
+use crate::bodies::Bodies;
+use crate::contacts::{Touches, is_held};
+use crate::distances::{TOUCH_M, depth_of};
+use crate::engine::Engine;
+use crate::link_pairs::LinkPairs;
+use crate::physics::Owner;
 use crate::reach::Reach;
-use actcheck_geometry::{from_pose, from_vector};
+use crate::robot::SimulatedRobot;
+use actcheck_data::{HeldCourse, JointCourse, Pose, RobotCourse, SelfCollision, SelfPress};
+use actcheck_geometry::from_pose;
 
 /// Control ticks between two self-collision checks. At 60 ticks per second, that is 20 checks per
 /// second: a link at 1 m/s moves 5 cm between them.
 const TICKS_PER_LOOK: u64 = 3;
 /// A motor above this share of its effort limit is overloaded.
 const OVERLOAD_SHARE: f64 = 0.99;
-/// Links that penetrate each other by no more than this only touch. Unit: metres.
-pub(super) const TOUCH_M: f64 = 1e-4;
 /// The depth of links is measured again once they have moved against each other by this much.
 /// Units: metres, radians.
 const SAME_M: f64 = 5e-4;
 const SAME_RAD: f64 = 2e-3;
-/// Error of positions in 32 bits. Unit: metres.
-pub(super) const ROUNDING_M: f64 = 1e-4;
 
 /// Measures a [`RobotCourse`].
 #[derive(Default)]
@@ -80,7 +77,8 @@ struct JointMeter {
 }
 
 impl RobotMeter {
-    fn begin(&mut self, n_joints: usize) {
+    /// Resets the measurement.
+    pub(super) fn begin(&mut self, n_joints: usize) {
         let nothing = JointMeter {
             max_excess: f64::NEG_INFINITY,
             max_speed_share: 0.0,
@@ -91,57 +89,42 @@ impl RobotMeter {
         self.self_contacts.clear();
         self.held.clear();
     }
-}
-
-impl World {
-    /// Returns the pose of a link in the frame of another one.
-    pub fn pose_between(&self, first: usize, second: usize) -> Option<Isometry3<f64>> {
-        let pose = |link: usize| {
-            self.engine
-                .bodies
-                .get(self.robot.bodies[link])
-                .map(|body| from_pose(body.position()))
-        };
-        Some(pose(first)?.inverse() * pose(second)?)
-    }
-
-    /// Resets the measurement.
-    pub(super) fn begin_robot_course(&mut self) {
-        self.recorder.robot.begin(self.robot.model.joints.len());
-    }
 
     /// Records the robot's state after a tick.
-    pub(super) fn record_robot(&mut self, touches: &BTreeMap<(Owner, Owner), Touch>) {
-        self.record_joints();
-        self.record_held(touches);
-        self.record_pressed_links(touches);
-        if self.recorder.n_ticks().is_multiple_of(TICKS_PER_LOOK) {
-            self.record_self_contacts();
+    pub(super) fn record(&mut self, engine: &Engine, reach: Reach, now: u64, touches: &Touches) {
+        let bodies = engine.bodies();
+        self.record_joints(&bodies.robot);
+        self.record_held(bodies, touches);
+        self.record_pressed_links(now, touches);
+        // Links are known to be apart where the robot can touch nothing.
+        let may_meet = reach > Reach::Apart || engine.link_pairs().all_pass();
+        if may_meet && now.is_multiple_of(TICKS_PER_LOOK) {
+            self.record_self_contacts(bodies, engine.link_pairs(), now);
         }
     }
 
-    /// Returns the course since the start.
-    pub(super) fn end_robot_course(&self) -> RobotCourse {
-        let (meter, tick_secs) = (&self.recorder.robot, self.tick_secs());
-        let joints = self
+    /// Returns the course since the start. `secs` converts a tick to the time since then.
+    pub(super) fn course(&self, bodies: &Bodies, secs: impl Fn(u64) -> f64) -> RobotCourse {
+        let tick_secs = bodies.tick_secs();
+        let joints = bodies
             .robot
             .model
             .joints
             .iter()
-            .zip(&meter.joints)
+            .zip(&self.joints)
             .map(|(joint, course)| JointCourse {
                 name: joint.name.clone(),
                 max_excess: course.max_excess,
                 max_speed_share: course.max_speed_share,
                 overload_secs: course.longest_overload as f64 * tick_secs,
             });
-        let contacts = meter.self_contacts.iter().map(|((first, second), met)| {
-            let mut pair = [*first, *second].map(|link| self.name_of(Owner::Link(link)));
+        let contacts = self.self_contacts.iter().map(|((first, second), met)| {
+            let mut pair = [*first, *second].map(|link| bodies.name_of(Owner::Link(link)));
             pair.sort();
-            let of_hand = self.robot.kinematics.are_of_hand(*first, *second);
+            let of_hand = bodies.robot.kinematics.are_of_hand(*first, *second);
             SelfCollision {
                 pair,
-                start_secs: self.recorder.secs_since_begin(met.tick),
+                start_secs: secs(met.tick),
                 max_depth_m: met.max_depth_m,
                 press: SelfPress {
                     max_force_n: met.max_force_n,
@@ -151,8 +134,8 @@ impl World {
         });
         let mut self_contacts: Vec<SelfCollision> = contacts.collect();
         self_contacts.sort_by(|a, b| a.pair.cmp(&b.pair));
-        let held = meter.held.iter().map(|(idx, (ticks, tilt))| HeldCourse {
-            id: self.name_of(Owner::Object(*idx)),
+        let held = self.held.iter().map(|(idx, (ticks, tilt))| HeldCourse {
+            id: bodies.name_of(Owner::Object(*idx)),
             held_secs: *ticks as f64 * tick_secs,
             max_tilt_rad: *tilt,
         });
@@ -164,15 +147,10 @@ impl World {
         }
     }
 
-    fn record_joints(&mut self) {
-        let (positions, velocities) = self.robot.state();
-        let efforts = self.robot.effort_shares();
-        let joints = self
-            .robot
-            .model
-            .joints
-            .iter()
-            .zip(&mut self.recorder.robot.joints);
+    fn record_joints(&mut self, robot: &SimulatedRobot) {
+        let (positions, velocities) = robot.state();
+        let efforts = robot.effort_shares();
+        let joints = robot.model.joints.iter().zip(&mut self.joints);
         for (idx, (joint, course)) in joints.enumerate() {
             let (Some(position), Some(velocity)) = (positions.get(idx), velocities.get(idx)) else {
                 continue;
@@ -184,7 +162,7 @@ impl World {
                 course.max_speed_share =
                     course.max_speed_share.max(velocity.abs() / joint.velocity);
             }
-            let grips = self.robot.layout.gripper.contains(idx) || joint.mimic.is_some();
+            let grips = robot.layout.gripper.contains(idx) || joint.mimic.is_some();
             let overloaded = !grips
                 && efforts
                     .get(idx)
@@ -194,67 +172,48 @@ impl World {
         }
     }
 
-    fn record_held(&mut self, touches: &BTreeMap<(Owner, Owner), Touch>) {
-        for (idx, object) in self.objects.iter().enumerate() {
-            if object.fixed || !self.is_held(idx, touches) {
+    fn record_held(&mut self, bodies: &Bodies, touches: &Touches) {
+        for (idx, object) in bodies.objects.iter().enumerate() {
+            if object.fixed || !is_held(&bodies.robot, idx, touches) {
                 continue;
             }
-            let Some(body) = self.engine.bodies.get(object.body) else {
+            let Some(body) = bodies.physics.bodies.get(object.body) else {
                 continue;
             };
             let tilt = Pose::from_isometry(&from_pose(body.position())).tilt();
-            let (ticks, most) = self.recorder.robot.held.entry(idx).or_insert((0, 0.0));
+            let (ticks, most) = self.held.entry(idx).or_insert((0, 0.0));
             (*ticks, *most) = (*ticks + 1, most.max(tilt));
         }
     }
 
-    /// Returns whether both fingers touch an object, each with any of its links.
-    pub(super) fn is_held(&self, object: usize, touches: &BTreeMap<(Owner, Owner), Touch>) -> bool {
-        let touches =
-            |link: &usize| touches.contains_key(&(Owner::Object(object), Owner::Link(*link)));
-        self.robot
-            .fingers
-            .iter()
-            .all(|finger| finger.iter().any(touches))
-    }
-
-    fn record_self_contacts(&mut self) {
-        if self.proximity.reach <= Reach::Apart && !self.link_pairs.pass {
-            // They are known to be apart.
-            return;
-        }
-        let now = self.recorder.n_ticks();
-        let mut met = std::mem::take(&mut self.recorder.robot.self_contacts);
-        for (first, second) in self.link_pairs.iter() {
+    fn record_self_contacts(&mut self, bodies: &Bodies, link_pairs: &LinkPairs, now: u64) {
+        let met = &mut self.self_contacts;
+        for (first, second) in link_pairs.iter() {
             let pair = (first, second);
             // The library's depth is fast, and wrong for hulls that only touch.
-            if self.depth_of(first, second) <= TOUCH_M {
+            if depth_of(bodies, first, second) <= TOUCH_M {
                 continue;
             }
-            let Some(between) = self.pose_between(first, second) else {
+            let Some(between) = bodies.pose_between(first, second) else {
                 continue;
             };
             if met.get(&pair).is_some_and(|known| known.is_known(&between)) {
                 continue;
             }
-            let depth = self.robot.model.solid_depth_m(first, second, &between);
+            let depth = bodies.robot.model.solid_depth_m(first, second, &between);
             if depth > TOUCH_M || met.contains_key(&pair) {
                 let known = met.entry(pair).or_insert(LinksMet::at(now));
                 known.max_depth_m = known.max_depth_m.max(depth);
                 known.measured = Some(between);
             }
         }
-        self.recorder.robot.self_contacts = met;
     }
 
     /// Records the forces between links.
-    fn record_pressed_links(&mut self, touches: &BTreeMap<(Owner, Owner), Touch>) {
-        let now = self.recorder.n_ticks();
+    fn record_pressed_links(&mut self, now: u64, touches: &Touches) {
         for (pair, touch) in touches {
             if let (Owner::Link(first), Owner::Link(second)) = pair {
                 let known = self
-                    .recorder
-                    .robot
                     .self_contacts
                     .entry((*first, *second))
                     .or_insert(LinksMet::at(now));
@@ -262,73 +221,6 @@ impl World {
             }
         }
     }
-
-    /// Returns the penetration depth of two links; 0 if they are apart. Unit: metres.
-    pub(super) fn depth_of(&self, first: usize, second: usize) -> f64 {
-        let (one, other) = (self.ball_of(first), self.ball_of(second));
-        let far = |(middle, radius): (Point3<f64>, f64), around: Option<(Point3<f64>, f64)>| {
-            around.is_some_and(|(other, its_radius)| {
-                (middle - other).norm() > radius + its_radius + ROUNDING_M
-            })
-        };
-        if one.is_some_and(|one| far(one, other)) {
-            return 0.0;
-        }
-        // Most shapes of a link are far from the other link.
-        let near = |idx: usize, around: Option<(Point3<f64>, f64)>| {
-            let solids = self
-                .colliders_of(self.robot.bodies[idx])
-                .zip(&self.robot.balls_of_shapes[idx]);
-            let balls = solids.map(|(solid, ball)| (placed(ball, solid), solid));
-            balls.filter(move |(ball, _)| !far(*ball, around))
-        };
-        let of_second: Vec<((Point3<f64>, f64), &Collider)> = near(second, one).collect();
-        let mut deepest = 0.0f64;
-        for ((middle, radius), a) in near(first, other) {
-            for ((other, other_radius), b) in &of_second {
-                if (middle - other).norm() > radius + other_radius {
-                    continue;
-                }
-                let met = contact(a.position(), a.shape(), b.position(), b.shape(), 0.0)
-                    .ok()
-                    .flatten();
-                deepest = deepest.max(met.map_or(0.0, |met| -f64::from(met.dist)));
-            }
-        }
-        deepest
-    }
-
-    /// Returns the centre and the radius of the ball around a link; `None` without shapes. Frame:
-    /// world. Unit: metres.
-    fn ball_of(&self, link: usize) -> Option<(Point3<f64>, f64)> {
-        let ball = self.robot.balls[link].as_ref()?;
-        let body = self.engine.bodies.get(self.robot.bodies[link])?;
-        Some((from_pose(body.position()) * ball.middle, ball.radius))
-    }
-
-    /// Returns the colliders of a body, without shells.
-    pub(super) fn colliders_of(&self, body: RigidBodyHandle) -> impl Iterator<Item = &Collider> {
-        let handles = self
-            .engine
-            .bodies
-            .get(body)
-            .map(rapier3d::prelude::RigidBody::colliders)
-            .unwrap_or_default();
-        let colliders = handles
-            .iter()
-            .filter_map(|handle| self.engine.colliders.get(*handle));
-        colliders.filter(|collider| collider.user_data & SHELL == 0)
-    }
-}
-
-/// Returns centre and radius of a solid's bounding ball, which is in the solid's frame. Frame:
-/// world. Unit: metres.
-fn placed(around: &BoundingSphere, solid: &Collider) -> (Point3<f64>, f64) {
-    let pose: Isometry3<f64> = from_pose(solid.position());
-    (
-        pose * Point3::from(from_vector(around.center)),
-        f64::from(around.radius),
-    )
 }
 
 #[cfg(test)]

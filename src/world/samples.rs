@@ -2,10 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use crate::World;
-use crate::contacts::Touch;
-use crate::engine::Owner;
+use crate::bodies::Bodies;
+use crate::contacts::{Touches, is_held};
+use crate::drive::Drive;
+use crate::engine::Engine;
 use crate::object::Object;
+use crate::physics::Owner;
 use actcheck_data::{Pose, Samples, Series};
 use actcheck_geometry::{from_pose, from_vector};
 
@@ -29,46 +31,47 @@ pub(super) struct SampleMeter {
     contacts: BTreeMap<(Owner, Owner), Vec<(usize, f64)>>,
 }
 
-impl World {
+impl SampleMeter {
     /// Starts new samples with the current state.
-    pub(super) fn begin_samples(&mut self) {
+    pub(super) fn begin(engine: &Engine, drive: &Drive, touches: &Touches) -> Self {
+        let bodies = engine.bodies();
         let mut series = Vec::new();
-        for object in self.sampled() {
+        for object in sampled(bodies) {
             let of_object = POSE.into_iter().chain(VELOCITY).chain(["held"]);
             series.extend(of_object.map(|quantity| Series::recorded(&object, "", quantity)));
         }
         let of_gripper = POSE.into_iter().chain(["opening"]);
         series.extend(of_gripper.map(|quantity| Series::recorded("gripper", "", quantity)));
         series.extend(BASE.map(|quantity| Series::recorded("robot", "", quantity)));
-        for joint in &self.robot.model.joints {
+        for joint in &bodies.robot.model.joints {
             let name = format!("joint/{}", joint.name);
             let of_joint = ["position", "velocity", "effort"];
             series.extend(of_joint.map(|quantity| Series::recorded(&name, "", quantity)));
         }
-        self.recorder.samples = SampleMeter {
+        let mut meter = Self {
             series,
-            ..SampleMeter::default()
+            ..Self::default()
         };
-        let touches = self.touches();
-        self.record_samples(&touches);
+        meter.record(engine, drive, touches);
+        meter
     }
 
     /// Records the state after a tick.
-    pub(super) fn record_samples(&mut self, touches: &BTreeMap<(Owner, Owner), Touch>) {
-        let mut meter = std::mem::take(&mut self.recorder.samples);
-        let mut series = meter.series.iter_mut();
+    pub(super) fn record(&mut self, engine: &Engine, drive: &Drive, touches: &Touches) {
+        let bodies = engine.bodies();
+        let mut series = self.series.iter_mut();
         let mut put = |value: f64| {
             if let Some(series) = series.next() {
                 series.push(value);
             }
         };
-        for (idx, object) in self
+        for (idx, object) in bodies
             .objects
             .iter()
             .enumerate()
             .filter(|(_, object)| can_move(object))
         {
-            let Some(body) = self.engine.bodies.get(object.body) else {
+            let Some(body) = bodies.physics.bodies.get(object.body) else {
                 continue;
             };
             let pose = Pose::from_isometry(&from_pose(body.position()));
@@ -84,42 +87,41 @@ impl World {
                 .iter()
                 .copied()
                 .for_each(&mut put);
-            put(f64::from(u8::from(self.is_held(idx, touches))));
+            put(f64::from(u8::from(is_held(&bodies.robot, idx, touches))));
         }
-        let (positions, velocities) = self.robot.state();
-        let hand = Pose::from_isometry(&self.robot.kinematics.grasp(&positions));
+        let (positions, velocities) = bodies.robot.state();
+        let hand = Pose::from_isometry(&bodies.robot.kinematics.grasp(&positions));
         hand.position
             .into_iter()
             .chain(hand.rotation)
             .for_each(&mut put);
-        put(self.opening_m(&positions));
-        let base = self.base_true();
+        put(engine.opening_m(&positions));
+        let base = bodies.base_true();
         base.into_iter()
-            .chain(self.believed(base))
+            .chain(drive.believed(base))
             .for_each(&mut put);
-        let efforts = self.robot.loads();
-        for idx in 0..self.robot.model.joints.len() {
+        let efforts = bodies.robot.loads();
+        for idx in 0..bodies.robot.model.joints.len() {
             [&positions, &velocities, &efforts]
                 .into_iter()
                 .for_each(|of| put(of.get(idx).copied().unwrap_or(0.0)));
         }
         for (pair, touch) in touches {
-            let forces = meter.contacts.entry(*pair).or_default();
-            forces.push((meter.count, touch.normal_n));
+            let forces = self.contacts.entry(*pair).or_default();
+            forces.push((self.count, touch.normal_n));
         }
-        meter.count += 1;
-        self.recorder.samples = meter;
+        self.count += 1;
     }
 
     /// Returns the samples since the start.
-    pub(super) fn end_samples(&mut self) -> Samples {
+    pub(super) fn end(&mut self, bodies: &Bodies) -> Samples {
         let SampleMeter {
             mut series,
             count,
             contacts,
-        } = std::mem::take(&mut self.recorder.samples);
+        } = std::mem::take(self);
         for ((first, second), forces) in contacts {
-            let mut pair = [self.name_of(first), self.name_of(second)];
+            let mut pair = [bodies.name_of(first), bodies.name_of(second)];
             pair.sort();
             let mut contact = Series::recorded(&pair[0], &pair[1], "contactForce");
             let mut values = vec![0.0; count];
@@ -130,20 +132,20 @@ impl World {
             series.push(contact);
         }
         Samples {
-            period_secs: self.tick_secs(),
+            period_secs: bodies.tick_secs(),
             count,
             series,
         }
     }
+}
 
-    /// Returns the ids of the objects that can move.
-    fn sampled(&self) -> Vec<String> {
-        let movable = self.objects.iter().filter(|object| can_move(object));
-        movable
-            .filter(|object| self.engine.bodies.get(object.body).is_some())
-            .map(|object| object.id.clone())
-            .collect()
-    }
+/// Returns the ids of the objects that can move.
+fn sampled(bodies: &Bodies) -> Vec<String> {
+    let movable = bodies.objects.iter().filter(|object| can_move(object));
+    movable
+        .filter(|object| bodies.physics.bodies.get(object.body).is_some())
+        .map(|object| object.id.clone())
+        .collect()
 }
 
 /// Returns whether an object can move in an action. Furniture can: it slides when it is pushed.

@@ -6,15 +6,13 @@
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use parry3d::bounding_volume::{Aabb, BoundingVolume};
-use parry3d::query::{contact, distance};
-use parry3d::shape::Cylinder;
-use rapier3d::prelude::{Collider, ColliderBuilder, ColliderHandle, Pose, RigidBody};
+use parry3d::query::contact;
+use rapier3d::prelude::{
+    Collider, ColliderBuilder, ColliderHandle, PhysicsWorld, Pose, RigidBodyHandle,
+};
 
-use crate::World;
-use crate::engine::SHELL;
-use crate::reach::Reach;
+use crate::physics::SHELL;
 use actcheck_data::{Part, Pose as PartPose, Shape};
-use actcheck_geometry::{from_pose, from_vector, to_pose, to_real};
 
 /// Largest change of a tube's radius for its height. In wider cones the staves differ from their
 /// shell.
@@ -29,9 +27,6 @@ const LIFT_M: f64 = 3e-3;
 /// Largest distance between the lower ends of a wall and of the foot in it, and between their
 /// surfaces. Unit: metres.
 const FOOT_M: f64 = 3e-3;
-/// Distance of things at rest from an open mouth. Unit: metres. Longer than the way of a hand in a
-/// tick.
-const MOUTH_M: f64 = 0.02;
 /// Largest penetration into a shell that appears. Unit: metres. Thinner than any wall.
 const DEEPEST_M: f32 = 1e-3;
 
@@ -40,13 +35,66 @@ pub(super) struct Hollow {
     /// Pose of the mouth: its centre, and z out of the tube. Frame: the object's.
     mouth: Isometry3<f64>,
     /// Radius of the mouth. Unit: metres.
-    radius: f64,
+    pub(super) radius: f64,
     /// The shell and the plates below it.
     closed: Vec<ColliderBuilder>,
     /// The staves and the foot, which the shell contains.
     inside: Vec<ColliderHandle>,
     /// The colliders of the shell and its plates, while they replace those inside.
     shown: Vec<ColliderHandle>,
+}
+
+impl Hollow {
+    /// Returns whether the shell replaces the parts inside.
+    pub(super) fn is_closed(&self) -> bool {
+        !self.shown.is_empty()
+    }
+
+    /// Returns the pose of the mouth, with the object at a pose: its centre, and z out of the tube.
+    pub(super) fn mouth_at(&self, at: &Isometry3<f64>) -> Isometry3<f64> {
+        at * self.mouth
+    }
+
+    /// Returns whether a solid is in the shell, with the object at a pose.
+    pub(super) fn contains(&self, at: &Pose, solid: &Collider) -> bool {
+        let its_box: Aabb = solid.compute_aabb();
+        self.closed.first().is_some_and(|shell| {
+            let pose = *at * shell.position;
+            shell.shape.compute_aabb(&pose).intersects(&its_box)
+                && contact(
+                    &pose,
+                    shell.shape.as_ref(),
+                    solid.position(),
+                    solid.shape(),
+                    0.0,
+                )
+                .ok()
+                .flatten()
+                .is_some_and(|met| met.dist < -DEEPEST_M)
+        })
+    }
+
+    /// Replaces the parts inside by the shell, or the shell by them.
+    pub(super) fn close(
+        &mut self,
+        physics: &mut PhysicsWorld,
+        body: RigidBodyHandle,
+        closed: bool,
+    ) {
+        for shown in self.shown.drain(..) {
+            physics.remove_collider(shown);
+        }
+        if closed {
+            let insert =
+                |built: &ColliderBuilder| physics.insert_collider(built.clone(), Some(body));
+            self.shown = self.closed.iter().map(insert).collect();
+        }
+        for handle in &self.inside {
+            if let Some(collider) = physics.colliders.get_mut(*handle) {
+                collider.set_enabled(!closed);
+            }
+        }
+    }
 }
 
 /// Returns the tubes of a model that have a foot and are steep enough. `handles` are the colliders
@@ -161,128 +209,4 @@ fn closed(tube: &Part) -> Option<Vec<Part>> {
         });
     }
     Some(parts)
-}
-
-impl World {
-    /// Returns whether all tubes of an object are closed, and there is one: for comparisons.
-    pub fn is_closed(&self, id: &str) -> bool {
-        let hollows = self
-            .objects
-            .iter()
-            .filter(|object| object.id == id)
-            .flat_map(|object| &object.hollows);
-        let closed: Vec<bool> = hollows.map(|hollow| !hollow.shown.is_empty()).collect();
-        !closed.is_empty() && closed.iter().all(|closed| *closed)
-    }
-
-    /// Decides for each hollow object whether it is closed in the next tick.
-    pub(super) fn close_hollows(&mut self, reach: Reach) {
-        if !self.proximity.shortcuts.shells || reach == Reach::Nothing {
-            return;
-        }
-        for object in 0..self.objects.len() {
-            for tube in 0..self.objects[object].hollows.len() {
-                let closed = self.can_be_closed(object, tube);
-                if closed == self.objects[object].hollows[tube].shown.is_empty() {
-                    self.close(object, tube, closed);
-                }
-            }
-        }
-    }
-
-    /// Returns whether nothing is at the mouth of a tube, or inside.
-    fn can_be_closed(&self, object: usize, tube: usize) -> bool {
-        let Some(body) = self.engine.bodies.get(self.objects[object].body) else {
-            return false;
-        };
-        let hollow = &self.objects[object].hollows[tube];
-        let (asleep, shown) = (body.is_sleeping(), !hollow.shown.is_empty());
-        if asleep && !shown {
-            return false;
-        }
-        let mouth = to_pose(&(from_pose(body.position()) * hollow.mouth));
-        // The axis of the engine's cylinders is y.
-        let lid = Cylinder::new(to_real(1e-3), to_real(hollow.radius));
-        let turned = to_pose(&Isometry3::rotation(
-            Vector3::x() * std::f64::consts::FRAC_PI_2,
-        ));
-        let lid_at = mouth * turned;
-        let around = lid.aabb(&lid_at);
-        let links = self.robot.bodies.iter().copied();
-        let others = self
-            .objects
-            .iter()
-            .enumerate()
-            .filter(|(idx, _)| *idx != object)
-            .map(|(_, other)| other);
-        // Between things at rest, nothing changes.
-        let others = others.filter(|other| !asleep || !self.rests(other));
-        let bodies = links.chain(others.map(|other| other.body));
-        for (body_near, handle) in
-            bodies.filter_map(|handle| Some((self.engine.bodies.get(handle)?, handle)))
-        {
-            let margin = to_real(MOUTH_M + self.way_between(body, body_near));
-            // A body with an impossible state is a fault, which is found after the step.
-            if !margin.is_finite() {
-                return shown;
-            }
-            let at_mouth = |solid: &Collider| {
-                around.loosened(margin).intersects(&solid.compute_aabb())
-                    && distance(&lid_at, &lid, solid.position(), solid.shape())
-                        .is_ok_and(|gap| gap.distance < margin)
-            };
-            let is_inside =
-                |solid: &Collider| !shown && self.is_in_shell(hollow, body.position(), solid);
-            if self
-                .colliders_of(handle)
-                .any(|solid| at_mouth(solid) || is_inside(solid))
-            {
-                return false;
-            }
-        }
-        true
-    }
-
-    /// Returns how far two bodies can approach each other in a tick. Unit: metres.
-    fn way_between(&self, one: &RigidBody, other: &RigidBody) -> f64 {
-        let speed = |body: &RigidBody| from_vector(body.linvel());
-        (speed(one) - speed(other)).norm() * self.tick_secs()
-    }
-
-    /// Returns whether a solid is in the shell of a tube, of which the object is here.
-    fn is_in_shell(&self, hollow: &Hollow, at: &Pose, solid: &Collider) -> bool {
-        let its_box: Aabb = solid.compute_aabb();
-        hollow.closed.first().is_some_and(|shell| {
-            let pose = *at * shell.position;
-            shell.shape.compute_aabb(&pose).intersects(&its_box)
-                && contact(
-                    &pose,
-                    shell.shape.as_ref(),
-                    solid.position(),
-                    solid.shape(),
-                    0.0,
-                )
-                .ok()
-                .flatten()
-                .is_some_and(|met| met.dist < -DEEPEST_M)
-        })
-    }
-
-    fn close(&mut self, object: usize, tube: usize, closed: bool) {
-        let body = self.objects[object].body;
-        let hollow = &mut self.objects[object].hollows[tube];
-        for shown in hollow.shown.drain(..) {
-            self.engine.remove_collider(shown);
-        }
-        if closed {
-            let insert =
-                |built: &ColliderBuilder| self.engine.insert_collider(built.clone(), Some(body));
-            hollow.shown = hollow.closed.iter().map(insert).collect();
-        }
-        for handle in &hollow.inside {
-            if let Some(collider) = self.engine.colliders.get_mut(*handle) {
-                collider.set_enabled(!closed);
-            }
-        }
-    }
 }

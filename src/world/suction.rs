@@ -7,13 +7,13 @@
 use nalgebra::{Isometry3, Point3, Vector3};
 use parry3d::query::Ray;
 use rapier3d::prelude::{
-    Collider, GenericJoint, ImpulseJointHandle, JointAxesMask, JointAxis, MotorModel,
+    Collider, GenericJoint, ImpulseJointHandle, JointAxesMask, JointAxis, MotorModel, PhysicsWorld,
     SpringCoefficients,
 };
 
-use crate::World;
+use crate::bodies::Bodies;
 use crate::contacts::{CONTACT_FLOOR_NEWTONS, Touch};
-use crate::engine::{Owner, collider};
+use crate::physics::{Owner, collider};
 use actcheck_data::{CupState, ObjectModel, Part, Pose, Suction};
 use actcheck_geometry::{from_vector, to_pose, to_real, to_vector};
 
@@ -110,7 +110,7 @@ impl Cup {
 
     /// Returns the opening of a gripper with the same command: 0 while the vacuum is on, otherwise
     /// the cup's diameter. Unit: metres.
-    fn opening_m(&self) -> f64 {
+    pub(super) fn opening_m(&self) -> f64 {
         if self.vacuum == Vacuum::Off {
             2.0 * self.suction.radius_m
         } else {
@@ -120,7 +120,7 @@ impl Cup {
 
     /// Returns the force with which the vacuum presses the lip on a body: 0 without a seal. Unit:
     /// newtons.
-    fn suction_n(&self) -> f64 {
+    pub(super) fn suction_n(&self) -> f64 {
         if matches!(self.vacuum, Vacuum::Sealed(_)) {
             self.limit_n
         } else {
@@ -133,6 +133,124 @@ impl Cup {
             Vacuum::Sealed(seal) => Some(seal),
             _ => None,
         }
+    }
+
+    /// Returns the state of the cup.
+    pub(super) fn state(&self) -> CupState {
+        let pull_n = self.seal().map_or(0.0, |seal| seal.load.force_n.x);
+        CupState {
+            force_n: self.limit_n,
+            pull_n,
+        }
+    }
+
+    /// Switches the vacuum on or off, by the commanded opening and force.
+    pub(super) fn switch(&mut self, physics: &mut PhysicsWorld, opening_m: f64, force_n: f64) {
+        self.limit_n = force_n.clamp(0.0, self.suction.force_n);
+        match (opening_m < ON_M, self.vacuum) {
+            (true, Vacuum::Off) => self.vacuum = Vacuum::Open,
+            (true, _) | (false, Vacuum::Off) => {}
+            (false, _) => {
+                self.cut_seal(physics);
+                self.vacuum = Vacuum::Off;
+            }
+        }
+    }
+
+    /// Returns the object that the cup holds, by its index.
+    pub(super) fn sealed(&self) -> Option<usize> {
+        self.seal().map(|seal| seal.object)
+    }
+
+    /// Seals the surface at the lip, if the cup is open and there is one.
+    pub(super) fn seal_surface(&mut self, bodies: &mut Bodies) {
+        if self.vacuum != Vacuum::Open {
+            return;
+        }
+        let lip = bodies.robot.kinematics.grasp(&bodies.robot.positions);
+        let objects = bodies.objects.iter().enumerate();
+        let solids = objects.flat_map(|(idx, object)| {
+            bodies
+                .colliders_of(object.body)
+                .map(move |solid| (idx, solid))
+        });
+        let solids: Vec<(usize, &Collider)> = solids.collect();
+        let Some(object) = surface_at(&lip, self.suction.radius_m, &solids) else {
+            return;
+        };
+        let (link, body) = (bodies.robot.finger_links[0], bodies.objects[object].body);
+        let from_link =
+            bodies.robot.kinematics.links(&bodies.robot.positions)[link].inverse() * lip;
+        let from_body = bodies.pose_of(&bodies.objects[object]).inverse() * lip;
+        let mut data = lip_joint(&self.suction);
+        data.set_local_frame1(to_pose(&from_link))
+            .set_local_frame2(to_pose(&from_body));
+        let joint =
+            bodies
+                .physics
+                .impulse_joints
+                .insert(bodies.robot.bodies[link], body, data, true);
+        self.vacuum = Vacuum::Sealed(Seal {
+            joint,
+            object,
+            load: Load::default(),
+        });
+    }
+
+    /// Measures the load of the seal in a step that is this share of its control tick.
+    pub(super) fn measure_seal(&mut self, physics: &PhysicsWorld, share: f64, begins_tick: bool) {
+        let Vacuum::Sealed(seal) = &mut self.vacuum else {
+            return;
+        };
+        let Some(joint) = physics.impulse_joints.get(seal.joint) else {
+            return;
+        };
+        let parameters = &physics.integration_parameters;
+        // The engine keeps the impulses of the last substep.
+        let per_second = parameters.num_solver_iterations as f64 / f64::from(parameters.dt);
+        let impulse = |coordinate: usize| f64::from(joint.impulses[coordinate]);
+        let force_n = Vector3::new(impulse(0), impulse(1), impulse(2)) * (per_second * share);
+        let turns = TILTS.map(|axis| f64::from(joint.data.motors[axis as usize].impulse));
+        let moment_nm = Vector3::from(turns) * (per_second * share);
+        if begins_tick {
+            seal.load = Load::default();
+        }
+        seal.load.force_n += force_n;
+        seal.load.moment_nm += moment_nm;
+    }
+
+    /// Breaks the seal at the end of a control tick if its mean load in the tick exceeds its
+    /// limits: air needs some milliseconds to come in.
+    pub(super) fn judge_seal(&mut self, physics: &mut PhysicsWorld) {
+        let breaks = self
+            .seal()
+            .is_some_and(|seal| seal.load.breaks(&self.suction, self.limit_n));
+        if breaks {
+            self.cut_seal(physics);
+            self.vacuum = Vacuum::Broken;
+        }
+    }
+
+    fn cut_seal(&self, physics: &mut PhysicsWorld) {
+        if let Some(seal) = self.seal() {
+            physics.impulse_joints.remove(seal.joint, true);
+        }
+    }
+
+    /// Returns the seal as the contact of a pair of owners. Returns `None` without a seal.
+    pub(super) fn touch(&self, bodies: &Bodies) -> Option<((Owner, Owner), Touch)> {
+        let seal = self.seal()?;
+        let lip = bodies.robot.kinematics.grasp(&bodies.robot.positions);
+        let force_n = lip.rotation * seal.load.force_n;
+        let pair = (
+            Owner::Object(seal.object),
+            Owner::Link(bodies.robot.finger_links[0]),
+        );
+        let normal_n = force_n.norm().max(2.0 * CONTACT_FLOOR_NEWTONS);
+        Some((
+            pair,
+            Touch::at(normal_n, force_n, lip.translation.vector.into()),
+        ))
     }
 }
 
@@ -216,146 +334,4 @@ pub fn would_seal(model: &ObjectModel, lip: &Pose, cup: &Suction) -> bool {
         .collect();
     let solids: Vec<(usize, &Collider)> = built.iter().map(|solid| (0, solid)).collect();
     surface_at(&lip.to_isometry(), cup.radius_m, &solids).is_some()
-}
-
-impl World {
-    /// Returns the gap between the fingers; for a suction cup, 0 while its vacuum is on, otherwise
-    /// its diameter. Unit: metres.
-    pub(super) fn opening_m(&self, positions: &[f64]) -> f64 {
-        self.cup.map_or_else(
-            || self.robot.layout.gripper.opening_m(positions),
-            |cup| cup.opening_m(),
-        )
-    }
-
-    /// Returns the force of each finger's motor; for a suction cup, the force of its vacuum, in the
-    /// place of both fingers. Unit: newtons.
-    pub(super) fn grip_forces_n(&self) -> [f64; 2] {
-        self.cup
-            .map_or_else(|| self.robot.finger_efforts(), |cup| [cup.suction_n(); 2])
-    }
-
-    /// Returns the state of the suction cup. Returns `None` if the gripper has fingers.
-    pub(super) fn cup_state(&self) -> Option<CupState> {
-        let cup = self.cup.as_ref()?;
-        let pull_n = cup.seal().map_or(0.0, |seal| seal.load.force_n.x);
-        Some(CupState {
-            force_n: cup.limit_n,
-            pull_n,
-        })
-    }
-
-    /// Switches the vacuum of a suction cup on or off, by the commanded opening and force.
-    pub(super) fn switch_vacuum(&mut self, opening_m: f64, force_n: f64) {
-        let Some(mut cup) = self.cup else { return };
-        cup.limit_n = force_n.clamp(0.0, cup.suction.force_n);
-        match (opening_m < ON_M, cup.vacuum) {
-            (true, Vacuum::Off) => cup.vacuum = Vacuum::Open,
-            (true, _) | (false, Vacuum::Off) => {}
-            (false, _) => {
-                self.cut_seal();
-                cup.vacuum = Vacuum::Off;
-            }
-        }
-        self.cup = Some(cup);
-    }
-
-    /// Returns the object that a suction cup holds, by its index.
-    pub(super) fn sealed(&self) -> Option<usize> {
-        self.cup.as_ref()?.seal().map(|seal| seal.object)
-    }
-
-    /// Seals the surface at the lip of an open cup, if there is one.
-    pub(super) fn seal_surface(&mut self) {
-        let Some(mut cup) = self.cup.filter(|cup| cup.vacuum == Vacuum::Open) else {
-            return;
-        };
-        let lip = self.robot.kinematics.grasp(&self.robot.positions);
-        let bodies = self.objects.iter().enumerate();
-        let solids = bodies.flat_map(|(idx, object)| {
-            self.colliders_of(object.body)
-                .map(move |solid| (idx, solid))
-        });
-        let solids: Vec<(usize, &Collider)> = solids.collect();
-        let Some(object) = surface_at(&lip, cup.suction.radius_m, &solids) else {
-            return;
-        };
-        let (link, body) = (self.robot.finger_links[0], self.objects[object].body);
-        let from_link = self.robot.kinematics.links(&self.robot.positions)[link].inverse() * lip;
-        let from_body = self.pose_of(&self.objects[object]).inverse() * lip;
-        let mut data = lip_joint(&cup.suction);
-        data.set_local_frame1(to_pose(&from_link))
-            .set_local_frame2(to_pose(&from_body));
-        let joint = self
-            .engine
-            .impulse_joints
-            .insert(self.robot.bodies[link], body, data, true);
-        cup.vacuum = Vacuum::Sealed(Seal {
-            joint,
-            object,
-            load: Load::default(),
-        });
-        self.cup = Some(cup);
-    }
-
-    /// Measures the load of the seal in a step that is this share of its control tick.
-    pub(super) fn measure_seal(&mut self, share: f64, begins_tick: bool) {
-        let Some(Cup {
-            vacuum: Vacuum::Sealed(seal),
-            ..
-        }) = &mut self.cup
-        else {
-            return;
-        };
-        let Some(joint) = self.engine.impulse_joints.get(seal.joint) else {
-            return;
-        };
-        let parameters = &self.engine.integration_parameters;
-        // The engine keeps the impulses of the last substep.
-        let per_second = parameters.num_solver_iterations as f64 / f64::from(parameters.dt);
-        let impulse = |coordinate: usize| f64::from(joint.impulses[coordinate]);
-        let force_n = Vector3::new(impulse(0), impulse(1), impulse(2)) * (per_second * share);
-        let turns = TILTS.map(|axis| f64::from(joint.data.motors[axis as usize].impulse));
-        let moment_nm = Vector3::from(turns) * (per_second * share);
-        if begins_tick {
-            seal.load = Load::default();
-        }
-        seal.load.force_n += force_n;
-        seal.load.moment_nm += moment_nm;
-    }
-
-    /// Breaks the seal at the end of a control tick if its mean load in the tick exceeds its
-    /// limits: air needs some milliseconds to come in.
-    pub(super) fn judge_seal(&mut self) {
-        let Some(mut cup) = self.cup else { return };
-        let breaks = cup
-            .seal()
-            .is_some_and(|seal| seal.load.breaks(&cup.suction, cup.limit_n));
-        if breaks {
-            self.cut_seal();
-            cup.vacuum = Vacuum::Broken;
-            self.cup = Some(cup);
-        }
-    }
-
-    fn cut_seal(&mut self) {
-        let joint = self.cup.as_ref().and_then(Cup::seal).map(|seal| seal.joint);
-        joint.map(|joint| self.engine.impulse_joints.remove(joint, true));
-    }
-
-    /// Returns the seal as the contact of a pair of owners. Returns `None` without a seal.
-    pub(super) fn seal_touch(&self) -> Option<((Owner, Owner), Touch)> {
-        let seal = self.cup.as_ref()?.seal()?;
-        let lip = self.robot.kinematics.grasp(&self.robot.positions);
-        let force_n = lip.rotation * seal.load.force_n;
-        let pair = (
-            Owner::Object(seal.object),
-            Owner::Link(self.robot.finger_links[0]),
-        );
-        let normal_n = force_n.norm().max(2.0 * CONTACT_FLOOR_NEWTONS);
-        Some((
-            pair,
-            Touch::at(normal_n, force_n, lip.translation.vector.into()),
-        ))
-    }
 }

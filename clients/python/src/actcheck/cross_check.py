@@ -132,9 +132,10 @@ def play(run: Run, change: Callable[[Any, Run], None], to: Path) -> float:
             if tick in ends and tick > ends[tick]["begin_tick"]:
                 action = ends[tick]
                 reported = action["reported"]
-                if reported and action["holds"]:
-                    reported = grips.hold(data)
-                recorder.mark(action["action"], "end", reported=reported, message=action["message"])
+                message = action["message"]
+                if reported and action["holds"] and not grips.hold():
+                    reported, message = False, "the fingers hold nothing"
+                recorder.mark(action["action"], "end", reported=reported, message=message)
             if tick in begins and tick < len(run.position):
                 action = begins[tick]
                 recorder.mark(action["action"], "begin", **action["parameters"])
@@ -143,6 +144,7 @@ def play(run: Run, change: Callable[[Any, Run], None], to: Path) -> float:
             for step in range(steps):
                 motors.drive(data, tick, (step + 1) / steps)
                 mujoco.mj_step(model, data)
+            grips.look(data)
             recorder.step()
     return time.process_time() - began
 
@@ -181,13 +183,17 @@ class _Motors:
 class _Grips:
     """What the fingers hold."""
 
+    #: Ticks for which a touch is remembered: MuJoCo drops the contacts of things that sleep, and a grip may slip for an instant.
+    _MEMORY = 6
+
     def __init__(self, mujoco: Any, model: Any, fingers: list[list[str]]) -> None:
         self._owner = model.geom_bodyid
         self._free = {body for body in range(model.nbody) if model.body_dofnum[model.body_rootid[body]] == 6}
         self._fingers = [{mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) for name in side} for side in fingers]
+        self._touched: list[list[set[int]]] = []
 
-    def hold(self, data: Any) -> bool:
-        """Whether both fingers touch the same object."""
+    def look(self, data: Any) -> None:
+        """Notes what each finger touches now."""
         touched: list[set[int]] = [set(), set()]
         for contact in range(data.ncon):
             first, second = (int(self._owner[geom]) for geom in data.contact.geom[contact])
@@ -195,7 +201,12 @@ class _Grips:
                 for side, finger in zip(touched, self._fingers, strict=True):
                     if one in finger and other in self._free:
                         side.add(other)
-        return bool(touched[0] & touched[1])
+        self._touched = [*self._touched[1 - self._MEMORY :], touched]
+
+    def hold(self) -> bool:
+        """Whether both fingers touch the same object, or did a moment ago."""
+        left, right = (set().union(*(moment[side] for moment in self._touched)) for side in range(2))
+        return bool(left & right)
 
 
 def main(arguments: list[str] | None = None) -> int:
