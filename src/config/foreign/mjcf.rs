@@ -4,29 +4,29 @@
 //! Sites and cameras become links, so that a profile can name them. Spatial tendons and options are
 //! not read.
 
+use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::rc::Rc;
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
-use crate::foreign::geom_mass::{self, GeomMass};
+use crate::foreign::geom_mass::{GeomMass, MeshMasses};
 use crate::foreign::lookup::{Lookup, beside};
+use crate::foreign::mjcf_budget::Budget;
 use crate::foreign::mjcf_compiler::{Compiler, Item, MjcfAttributes, Whole, with_includes};
 use crate::foreign::mjcf_couplings::{Couplings, elements};
 use crate::foreign::mjcf_masks::{Mask, collides};
 use crate::foreign::xml::{self, Bound, Node, Reader};
-use actcheck_base::{Diagnostics, Source, SourceSpan};
+use actcheck_base::{Diagnostic, Diagnostics, Source, SourceSpan};
 use actcheck_data::{
-    Mesh, ModelTree, TreeInertial, TreeJoint, TreeLink, TreeMimic, TreeMotion, TreeSolid,
+    Mesh, ModelTree, Spread, TreeInertial, TreeJoint, TreeLink, TreeMimic, TreeMotion, TreeSolid,
 };
 
 /// Largest effort of a joint without limits of its actuator. Units: newtons or newton metres.
 const EFFORT: f64 = 100.0;
 /// Largest velocity of joints, which MJCF does not have. Units: rad/s and m/s.
 const VELOCITY: [f64; 2] = [2.0, 0.5];
-/// Most bodies whose pairs are compared.
-const MOST_BODIES: usize = 1_000;
 /// Range of an unlimited sliding joint. Unit: metres.
 const SLIDES_M: f64 = 10.0;
 /// Deepest attachment of models to others: deeper ones attach themselves.
@@ -44,7 +44,8 @@ pub(crate) fn robot(
     path: &Path,
     lookup: &Lookup,
 ) -> Result<MjcfRead, Diagnostics> {
-    whole(source, path, lookup, Purpose::Robot, 0)
+    let budget = Budget::default();
+    whole(source, File::first(path, lookup, &budget), Purpose::Robot)
 }
 
 /// Reads an object: its joints without a name of their own move its parts, and it moves freely
@@ -57,7 +58,8 @@ pub(crate) fn object(
     path: &Path,
     lookup: &Lookup,
 ) -> Result<MjcfRead, Diagnostics> {
-    whole(source, path, lookup, Purpose::Object, 0)
+    let budget = Budget::default();
+    whole(source, File::first(path, lookup, &budget), Purpose::Object)
 }
 
 /// The use of a model.
@@ -67,52 +69,40 @@ pub(super) enum Purpose {
     Object,
 }
 
-fn whole(
-    source: &Source,
-    path: &Path,
-    lookup: &Lookup,
-    purpose: Purpose,
-    depth: usize,
-) -> Result<MjcfRead, Diagnostics> {
-    with_model(
-        source,
-        path,
-        lookup,
-        (purpose, depth),
-        |root, mut model, reader| {
-            let world = model.unique("world");
-            model.link(TreeLink::frame(world.clone(), reader.place(root)));
-            if xml::child(root, "worldbody").is_none() {
-                reader.error(
-                    "W033",
-                    root,
-                    "`<mujoco>` has no `<worldbody>`".to_owned(),
-                    "add the bodies",
-                );
-            }
-            for worldbody in xml::children(root, "worldbody") {
-                model.worldbody(worldbody, &world, reader);
-            }
-            if purpose == Purpose::Robot {
-                model.add_passing(root);
-            }
-            model.weigh(reader);
-            model.tree.name = root.attribute("model").unwrap_or("robot").to_owned();
-            model.tree
-        },
-    )
+fn whole(source: &Source, file: File<'_>, purpose: Purpose) -> Result<MjcfRead, Diagnostics> {
+    with_model(source, file, purpose, |root, mut model, reader| {
+        let world = model.unique("world");
+        model.link(TreeLink::frame(world.clone(), reader.place(root)));
+        if xml::child(root, "worldbody").is_none() {
+            reader.error(
+                "W033",
+                root,
+                "`<mujoco>` has no `<worldbody>`".to_owned(),
+                "add the bodies",
+            );
+        }
+        for worldbody in xml::children(root, "worldbody") {
+            model.worldbody(worldbody, &world, reader);
+        }
+        if purpose == Purpose::Robot {
+            model.add_passing(root);
+        }
+        model.weigh(reader);
+        model.tree.name = root.attribute("model").unwrap_or("robot").to_owned();
+        model.tree
+    })
 }
 
 /// Reads the settings of a text, and calls `read` with its root and a model without bodies. Returns
 /// its result, the text with all included files, and warnings.
 pub(super) fn with_model<T>(
     source: &Source,
-    path: &Path,
-    lookup: &Lookup,
-    (purpose, depth): (Purpose, usize),
+    file: File<'_>,
+    purpose: Purpose,
     read: impl FnOnce(Node, Model, &mut Reader) -> T,
 ) -> Result<(T, Source, Diagnostics), Diagnostics> {
-    let Whole { source, pieces } = with_includes(source, path, lookup.files)?;
+    let Whole { source, pieces } =
+        with_includes(source, file.path, file.lookup.files, file.budget)?;
     let document = xml::parse_model(&source, &source.text)?;
     let root = document.root_element();
     let mut reader = Reader::new(&source);
@@ -125,13 +115,11 @@ pub(super) fn with_model<T>(
         compiler: Rc::new(compiler),
         names: BTreeMap::new(),
         joint_names: BTreeMap::new(),
+        own: BTreeMap::new(),
         masks: BTreeMap::new(),
+        meshes: Rc::default(),
         purpose,
-        file: File {
-            path,
-            lookup,
-            depth,
-        },
+        file,
     };
     let read = read(root, model, &mut reader);
     let said = reader.found;
@@ -164,8 +152,22 @@ fn names_of_bodies(root: Node) -> BTreeSet<String> {
 pub(super) struct File<'a> {
     pub(super) path: &'a Path,
     pub(super) lookup: &'a Lookup<'a>,
+    /// What it and all models that it belongs to may still grow by.
+    pub(super) budget: &'a Budget,
     /// Number of models that it is attached to.
     depth: usize,
+}
+
+impl<'a> File<'a> {
+    /// A file that is attached to no other.
+    pub(super) fn first(path: &'a Path, lookup: &'a Lookup<'a>, budget: &'a Budget) -> Self {
+        Self {
+            path,
+            lookup,
+            budget,
+            depth: 0,
+        }
+    }
 }
 
 /// A model being read.
@@ -179,8 +181,13 @@ pub(super) struct Model<'a> {
     names: BTreeMap<String, u32>,
     /// The same for joints: a joint often has the name of its body.
     joint_names: BTreeMap<String, u32>,
+    /// The file's own bodies by the names of their links, and whether they have joints: those of
+    /// attached models are not among them.
+    own: BTreeMap<String, bool>,
     /// The masks of each body's colliding geoms.
     masks: BTreeMap<String, BTreeSet<Mask>>,
+    /// Meshes of the file that differ from those of their own files; `None` for those with a fault.
+    pub(super) meshes: Rc<RefCell<BTreeMap<String, Option<Rc<Mesh>>>>>,
     purpose: Purpose,
     pub(super) file: File<'a>,
 }
@@ -200,7 +207,9 @@ impl Model<'_> {
             bodies: Rc::clone(&self.bodies),
             names: BTreeMap::new(),
             joint_names: BTreeMap::new(),
+            own: BTreeMap::new(),
             masks: BTreeMap::new(),
+            meshes: Rc::clone(&self.meshes),
             ..*self
         }
     }
@@ -210,8 +219,11 @@ impl Model<'_> {
     }
 
     /// Keeps a mesh that the file itself contains.
-    pub(super) fn keep_mesh(&mut self, name: &str, mesh: Mesh) {
-        self.tree.inline_meshes.insert(name.to_owned(), mesh);
+    pub(super) fn keep_mesh(&mut self, name: &str, mesh: &Mesh) {
+        let known = &mut self.tree.inline_meshes;
+        if !known.contains_key(name) {
+            known.insert(name.to_owned(), mesh.clone());
+        }
     }
 
     /// Adds a link without mass and shapes, fixed to another at a pose in its frame.
@@ -239,12 +251,6 @@ impl Model<'_> {
             .iter()
             .filter(|(_, masks)| !masks.is_empty())
             .collect();
-        // More links are refused when the text is read.
-        let solid = if solid.len() > MOST_BODIES {
-            Vec::new()
-        } else {
-            solid
-        };
         for (idx, (first, of_first)) in solid.iter().enumerate() {
             for (second, of_second) in &solid[idx + 1..] {
                 if !of_first
@@ -265,7 +271,12 @@ impl Model<'_> {
     /// Adds the bodies of a world, and its solids, which are fixed.
     fn worldbody(&mut self, worldbody: Node, world: &str, reader: &mut Reader) {
         let compiler = Rc::clone(&self.compiler);
-        let content = compiler.content(worldbody, worldbody.attribute("childclass"), reader);
+        let content = compiler.content(
+            worldbody,
+            worldbody.attribute("childclass"),
+            self.file.budget,
+            reader,
+        );
         let [solids, visuals] = self.geoms(&content, &Isometry3::identity(), reader);
         if let Some(link) = self.tree.links.iter_mut().find(|link| link.name == world) {
             link.solids.extend(solids);
@@ -338,13 +349,12 @@ impl Model<'_> {
             Ok(source) => source,
             Err(reason) => return refused(format!("cannot read {}: {reason}", path.display())),
         };
-        let read = whole(
-            &source,
-            &path,
-            self.file.lookup,
-            self.purpose,
-            self.file.depth + 1,
-        );
+        let attached = File {
+            path: &path,
+            depth: self.file.depth + 1,
+            ..self.file
+        };
+        let read = whole(&source, attached, self.purpose);
         let tree = match read {
             Ok((tree, _, said)) => {
                 reader.found.extend(said);
@@ -420,13 +430,16 @@ impl Model<'_> {
     ) {
         let compiler = Rc::clone(&self.compiler);
         let body = item.node;
+        if !self.file.budget.body(body, reader) {
+            return;
+        }
         let class = body.attribute("childclass").or(item.class);
         let place = reader.place(body);
         let name = item.name().unwrap_or_else(|| "body".to_owned());
         let name = self.unique(&name);
         let attributes = compiler.attributes(body, item.class);
         let mut at = shift * compiler.pose(&attributes, body, reader);
-        let content = compiler.content(body, class, reader);
+        let content = compiler.content(body, class, self.file.budget, reader);
         let inside: Vec<Item<'_>> = content
             .into_iter()
             .map(|inner| Item {
@@ -440,6 +453,8 @@ impl Model<'_> {
                 || joint.is("joint")
                     && compiler.attributes(joint.node, joint.class).get("type") == Some("free")
         };
+        let is_jointed = |joint: &Item| joint.is("joint") || joint.is("freejoint");
+        self.own.insert(name.clone(), inside.iter().any(is_jointed));
         let joints: Vec<&Item> = inside
             .iter()
             .filter(|joint| joint.is("joint") && !is_free(joint))
@@ -658,47 +673,75 @@ impl Model<'_> {
         effort.unwrap_or(unstated)
     }
 
-    /// Gives each link without a stated mass that of its geoms, and applies the rules of
-    /// `<compiler>` to all masses.
+    /// Gives each body of this file without a stated mass that of its geoms, and applies the rules of
+    /// `<compiler>`. Those of attached models have been weighed by their own rules, but the mass of
+    /// the whole is that of all bodies.
     pub(super) fn weigh(&mut self, reader: &mut Reader) {
+        let rules = Rc::clone(&self.compiler);
+        let from_geoms = rules.masses.from_geoms != Some(false);
         let mut meshes = BTreeMap::new();
         let mut shapes = self.shapes();
+        let mut masses = MeshMasses::default();
+        let mut weighed = BTreeMap::new();
         let tree = &self.tree;
-        let unweighed = tree.links.iter().skip(1);
-        for link in unweighed.filter(|link| link.inertial.is_none()) {
+        let own = tree
+            .links
+            .iter()
+            .filter(|link| link.inertial.is_none())
+            .filter_map(|link| Some((link, *self.own.get(&link.name)?)));
+        for (link, moves) in own {
             let geoms = link.solids.iter().chain(&link.visuals);
-            for geom in geoms.filter(|geom| geom.matter.is_some()) {
+            let heavy = geoms.filter(|geom| from_geoms && geom.matter.is_some());
+            for geom in heavy.clone() {
                 shapes.load(geom, tree, &mut meshes, &mut reader.found);
+                let spread = geom.matter.map_or(Spread::Inside, |matter| matter.spread);
+                let unit = masses.of_unit(&geom.geometry, spread, &meshes);
+                if spread == Spread::Exact && unit.is_some_and(|unit| unit.kg <= 0.0) {
+                    let message =
+                        "this mesh has no exact inertia: its triangles are turned inwards";
+                    let help = "write `inertia=\"legacy\"` at its `<mesh>`, or turn its triangles";
+                    let fault = Diagnostic::error("W037", message)
+                        .at(&geom.place.source, xml::tag(&geom.place));
+                    reader.found.push(fault.help(help));
+                }
             }
-        }
-        let rules = Rc::clone(&self.compiler);
-        // The first link is the world, which does not move and has no mass.
-        for link in self.tree.links.iter_mut().skip(1) {
-            if link.inertial.is_none() {
-                let geoms = link.solids.iter().chain(&link.visuals);
-                let GeomMass { kg, com, about_com } = geom_mass::together(geoms, &meshes);
-                link.inertial = (kg > 0.0).then(|| TreeInertial {
+            let GeomMass { kg, com, about_com } = masses.together(heavy, &meshes);
+            if kg > 0.0 || rules.masses.least[0] > 0.0 {
+                let inertial = TreeInertial {
                     pose: Isometry3::translation(com.x, com.y, com.z),
                     kg,
                     about_com,
                     place: link.place.clone(),
                     moments_place: None,
-                });
+                };
+                weighed.insert(link.name.clone(), inertial);
+            } else if !from_geoms && moves {
+                let message = format!("the body `{}` moves and has no mass", link.name);
+                let help =
+                    "add an `<inertial>`: with `inertiafromgeom=\"false\"`, geoms have no mass";
+                let fault = Diagnostic::error("W033", message)
+                    .at(&link.place.source, xml::tag(&link.place));
+                reader.found.push(fault.help(help));
             }
-            if let Some(inertial) = &mut link.inertial {
+        }
+        for link in &mut self.tree.links {
+            if let Some(inertial) = weighed.remove(&link.name) {
+                link.inertial = Some(inertial);
+            }
+            if let Some(inertial) = &mut link.inertial
+                && self.own.contains_key(&link.name)
+            {
                 rules.masses.apply(inertial);
             }
         }
-        let inertials = || {
-            self.tree
-                .links
-                .iter()
-                .filter_map(|link| link.inertial.as_ref())
-        };
-        let total: f64 = inertials().map(|inertial| inertial.kg).sum();
-        if let Some(wanted) = rules.masses.total_kg.filter(|_| total > 0.0) {
-            let links = self.tree.links.iter_mut();
-            for inertial in links.filter_map(|link| link.inertial.as_mut()) {
+        let inertials = self.tree.links.iter_mut();
+        let inertials: Vec<&mut TreeInertial> = inertials
+            .filter_map(|link| link.inertial.as_mut())
+            .collect();
+        let total: f64 = inertials.iter().map(|inertial| inertial.kg).sum();
+        let wanted = rules.masses.total_kg;
+        if let Some(wanted) = wanted.filter(|_| total > 0.0 && self.file.depth == 0) {
+            for inertial in inertials {
                 inertial.kg *= wanted / total;
                 inertial.about_com *= wanted / total;
             }
@@ -869,6 +912,86 @@ mod tests {
         robot(&source, Path::new("robot.xml"), &lookup).map(|(tree, ..)| tree)
     }
 
+    /// Reads the first of some files in one folder.
+    fn read_files(files: &[(&str, &str)]) -> Result<ModelTree, String> {
+        let folder = tempfile::tempdir().expect("there is room");
+        for (path, text) in files {
+            let path = folder.path().join(path);
+            std::fs::create_dir_all(path.parent().expect("a folder")).expect("it is new");
+            std::fs::write(path, text).expect("there is room");
+        }
+        let lookup = Lookup {
+            files: &Files::Disk,
+            folders: Vec::new(),
+        };
+        let (name, text) = files[0];
+        let source = Source::new(name, text.to_owned());
+        robot(&source, &folder.path().join(name), &lookup)
+            .map(|(tree, ..)| tree)
+            .map_err(|faults| faults.to_string())
+    }
+
+    /// A few lines ask for billions of bodies, of files, or of attached models.
+    #[test]
+    fn models_that_explode_are_refused_at_once() {
+        let said = |files: &[(&str, &str)]| {
+            let start = std::time::Instant::now();
+            let said = read_files(files).expect_err("it is far too large");
+            assert!(said.contains("W055"), "{said}");
+            assert!(said.matches("error").count() <= 2, "{said}");
+            assert!(start.elapsed().as_secs_f64() < 5.0, "{:?}", start.elapsed());
+            said
+        };
+        let nested = |open: &str, close: &str, n: usize| {
+            let inside = "<geom size=\"0.1\"/>";
+            let body = format!("{}{inside}{}", open.repeat(n), close.repeat(n));
+            format!("<mujoco><worldbody>{body}</worldbody></mujoco>")
+        };
+        let copies = "<replicate count=\"1000\">";
+        let bodies = nested(&format!("{copies}<body>"), "</body></replicate>", 3);
+        assert!(said(&[("a.xml", &bodies)]).contains("more than 1000 bodies"));
+        let geoms = nested(copies, "</replicate>", 5);
+        assert!(said(&[("a.xml", &geoms)]).contains("more than 10000 elements"));
+        let frames = nested("<frame>", "</frame>", 900);
+        assert!(said(&[("a.xml", &frames)]).contains("frames in each other"));
+        said(&[("a.xml", &nested("<body>", "</body>", 4_000))]);
+
+        let include = |n: usize| {
+            let twice = format!("<include file=\"{}.xml\"/>", n + 1).repeat(8);
+            (format!("{n}.xml"), format!("<mujoco>{twice}</mujoco>"))
+        };
+        let mut files: Vec<(String, String)> = (0..7).map(include).collect();
+        files.push((
+            "7.xml".to_owned(),
+            "<mujoco><worldbody/></mujoco>".to_owned(),
+        ));
+        let of = |files: &[(String, String)]| -> String {
+            let files: Vec<(&str, &str)> = files
+                .iter()
+                .map(|(name, text)| (name.as_str(), text.as_str()))
+                .collect();
+            said(&files)
+        };
+        assert!(of(&files).contains("more than 1000 files"));
+
+        let attach = |n: usize| {
+            let asset = format!("<asset><model name=\"m\" file=\"{}.xml\"/></asset>", n + 1);
+            let bodies: String = (0..8)
+                .map(|idx| format!("<frame><attach model=\"m\" prefix=\"{idx}_\"/></frame>"))
+                .collect();
+            let text = format!("<mujoco>{asset}<worldbody>{bodies}</worldbody></mujoco>");
+            (format!("{n}.xml"), text)
+        };
+        let mut files: Vec<(String, String)> = (0..7).map(attach).collect();
+        files.push((
+            "7.xml".to_owned(),
+            "<mujoco><worldbody/></mujoco>".to_owned(),
+        ));
+        assert!(of(&files).contains("more than 1000 files"));
+        files[7].1 = "<mujoco><worldbody><body/></worldbody></mujoco>".to_owned();
+        of(&files);
+    }
+
     /// The mass of a link.
     fn kg(tree: &ModelTree, link: &str) -> f64 {
         let link = tree.link(link).expect("it has the link");
@@ -986,6 +1109,56 @@ mod tests {
         assert_eq!(servo, Some(6.0));
         assert_eq!(effort("<motor forcerange=\"-3 3\"/>"), Some(1.0));
         assert_eq!(effort("<position kp=\"9\"/><motor/>"), Some(1.0));
+    }
+
+    /// Bodies without a mass are raised to the least one; an attached model is weighed by its own
+    /// rules alone, but the mass of the whole is that of all bodies. (As in MuJoCo 3.3.1.)
+    #[test]
+    fn masses_follow_the_rules_of_their_own_file() {
+        let arm = |rules: &str| {
+            format!(
+                "<mujoco><compiler {rules}/><asset><model name=\"h\" file=\"h.xml\"/></asset><worldbody>\
+                 <body name=\"a\"><joint/><geom size=\"0.05\"/><body name=\"empty\"><site name=\"s\"/></body>\
+                 <frame><attach model=\"h\" body=\"h\" prefix=\"p_\"/></frame></body></worldbody></mujoco>"
+            )
+        };
+        let hand = |rules: &str| {
+            format!(
+                "<mujoco><compiler {rules}/><worldbody><body name=\"h\"><joint/><geom size=\"0.01\"/></body>\
+                 </worldbody></mujoco>"
+            )
+        };
+        for (of_arm, of_hand, masses) in [
+            ("", "", [0.523_599, 0.0, 0.004_189]),
+            (
+                "",
+                "boundmass=\"3\" boundinertia=\"0.3\"",
+                [0.523_599, 0.0, 3.0],
+            ),
+            ("boundmass=\"7\"", "boundmass=\"3\"", [7.0, 7.0, 3.0]),
+            ("boundmass=\"7\"", "", [7.0, 7.0, 0.004_189]),
+            ("", "settotalmass=\"5\"", [0.523_599, 0.0, 0.004_189]),
+            (
+                "settotalmass=\"9\"",
+                "settotalmass=\"5\"",
+                [8.928_571, 0.0, 0.071_429],
+            ),
+        ] {
+            let tree = read_files(&[("a.xml", &arm(of_arm)), ("h.xml", &hand(of_hand))]);
+            let tree = tree.expect("it is valid");
+            for (link, expected) in ["a", "empty", "p_h"].into_iter().zip(masses) {
+                let found = kg(&tree, link);
+                assert!(
+                    (found - expected).abs() < 1e-5,
+                    "{link}: {found}, {of_arm}, {of_hand}"
+                );
+            }
+            assert!(tree.link("s").is_some_and(|site| site.inertial.is_none()));
+        }
+        let said = read_files(&[("a.xml", &hand("inertiafromgeom=\"false\""))]);
+        assert!(said.is_err_and(|said| said.contains("moves and has no mass")));
+        let tree = read_files(&[("a.xml", &hand("inertiafromgeom=\"false\" boundmass=\"2\""))]);
+        assert!((kg(&tree.expect("it is valid"), "h") - 2.0).abs() < 1e-9);
     }
 
     /// A box between two points is as deep as it is wide, and a mesh of vertices alone is their

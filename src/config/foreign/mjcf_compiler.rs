@@ -2,22 +2,22 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use nalgebra::{
     Isometry3, Matrix3, Quaternion, Rotation3, Translation3, Unit, UnitQuaternion, Vector3,
 };
 
 use crate::foreign::lookup::beside;
+use crate::foreign::mjcf_budget::Budget;
 use crate::foreign::xml::{self, Bound, Node, Pieces, Reader};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Source, did_you_mean};
-use actcheck_data::TreeInertial;
+use actcheck_data::{Spread, TreeInertial};
 
 /// Deepest inclusion of files: deeper ones include themselves.
 const DEEPEST: usize = 8;
 /// Most copies of a `<replicate>`.
 const MOST_COPIES: usize = 1_000;
-/// Most elements of a body, with those of all copies.
-const MOST_ITEMS: usize = 10_000;
 /// Types of geoms.
 const GEOMS: [&str; 9] = [
     "plane",
@@ -56,7 +56,7 @@ pub(super) struct Compiler {
     /// Default attributes by class and element.
     defaults: BTreeMap<String, BTreeMap<String, Values>>,
     /// By the mesh's name.
-    pub(super) meshes: BTreeMap<String, MeshAsset>,
+    pub(super) meshes: BTreeMap<String, Rc<MeshAsset>>,
     /// Files of other models, by their names.
     pub(super) models: BTreeMap<String, String>,
     /// Geoms that a `<pair>` lets collide.
@@ -79,8 +79,8 @@ pub(super) struct MeshAsset {
     /// Corners of a mesh that the model's file contains, and its triangles, if it has any.
     pub(super) vertices: Vec<[f64; 3]>,
     pub(super) triangles: Vec<[u32; 3]>,
-    /// Whether only its surface has a mass.
-    pub(super) is_shell: bool,
+    /// How its mass is spread.
+    pub(super) spread: Spread,
 }
 
 /// The attributes of `<compiler>` that decide about masses.
@@ -161,13 +161,6 @@ pub(super) struct Item<'a> {
     pub(super) class: Option<&'a str>,
     /// The end of its name: the number of its copy.
     pub(super) suffix: String,
-}
-
-/// The elements in a body, and the number of those that were visited.
-#[derive(Default)]
-struct Content<'a> {
-    items: Vec<Item<'a>>,
-    n_visited: usize,
 }
 
 impl Item<'_> {
@@ -302,7 +295,7 @@ impl Compiler {
                 Translation3::from(Vector3::from(position.unwrap_or_default())),
                 turn.unwrap_or_default(),
             ),
-            is_shell: attributes.get("inertia") == Some("shell"),
+            spread: spread(node, &attributes, reader),
             ..MeshAsset::default()
         };
         if file.is_none() {
@@ -318,7 +311,7 @@ impl Compiler {
             }
         }
         mesh.file = file;
-        self.meshes.insert(name, mesh);
+        self.meshes.insert(name, Rc::new(mesh));
     }
 
     fn add_model(&mut self, node: Node, reader: &mut Reader) {
@@ -408,11 +401,13 @@ impl Compiler {
         }
     }
 
-    /// Returns the elements in a body: its own, and those of its `<frame>`s and `<replicate>`s.
+    /// Returns the elements in a body: its own, and those of its `<frame>`s and `<replicate>`s; not
+    /// all of them if the budget is spent.
     pub(super) fn content<'a>(
         &self,
         body: Node<'a>,
         class: Option<&'a str>,
+        budget: &Budget,
         reader: &mut Reader,
     ) -> Vec<Item<'a>> {
         let whole = Item {
@@ -421,19 +416,20 @@ impl Compiler {
             class,
             suffix: String::new(),
         };
-        let mut found = Content::default();
-        self.add_content(&whole, &mut found, reader);
-        if found.n_visited > MOST_ITEMS {
-            let message = format!("this element has more than {MOST_ITEMS} others and copies");
-            reader.error("W055", body, message, "use fewer copies");
-        }
-        found.items
+        let mut found = Vec::new();
+        self.add_content((&whole, 0), &mut found, budget, reader);
+        found
     }
 
-    fn add_content<'a>(&self, of: &Item<'a>, found: &mut Content<'a>, reader: &mut Reader) {
+    fn add_content<'a>(
+        &self,
+        (of, depth): (&Item<'a>, usize),
+        found: &mut Vec<Item<'a>>,
+        budget: &Budget,
+        reader: &mut Reader,
+    ) {
         for node in of.node.children().filter(Node::is_element) {
-            found.n_visited += 1;
-            if found.n_visited > MOST_ITEMS {
+            if !budget.element(depth, node, reader) {
                 return;
             }
             let inside = |shift: Isometry3<f64>, suffix: String| Item {
@@ -446,7 +442,7 @@ impl Compiler {
                 "frame" => {
                     let pose = self.pose(&self.attributes(node, of.class), node, reader);
                     let frame = inside(of.shift * pose, of.suffix.clone());
-                    self.add_content(&frame, found, reader);
+                    self.add_content((&frame, depth + 1), found, budget, reader);
                 }
                 "replicate" => {
                     let Some((count, step)) = self.copies(node, reader) else {
@@ -456,16 +452,16 @@ impl Compiler {
                     let separator = node.attribute("sep").unwrap_or_default();
                     let mut shift = of.shift;
                     for number in 0..count {
-                        found.n_visited += 1;
-                        if found.n_visited > MOST_ITEMS {
+                        if !budget.element(depth, node, reader) {
                             return;
                         }
                         let suffix = format!("{separator}{number:0digits$}{}", of.suffix);
-                        self.add_content(&inside(shift, suffix), found, reader);
+                        let copy = inside(shift, suffix);
+                        self.add_content((&copy, depth + 1), found, budget, reader);
                         shift *= step;
                     }
                 }
-                _ => found.items.push(Item {
+                _ => found.push(Item {
                     node,
                     shift: of.shift,
                     class: of.class,
@@ -568,6 +564,22 @@ impl Compiler {
     }
 }
 
+/// How the mass of a mesh is spread, by its `inertia`.
+fn spread(node: Node, attributes: &MjcfAttributes<'_>, reader: &mut Reader) -> Spread {
+    match attributes.get("inertia") {
+        None | Some("legacy") => Spread::Inside,
+        Some("exact") => Spread::Exact,
+        Some("convex") => Spread::Hull,
+        Some("shell") => Spread::Shell,
+        Some(other) => {
+            let message = format!("`inertia` can't be `{other}`");
+            let help = "write `convex`, `exact`, `legacy` or `shell`";
+            reader.error("W034", node, message, help);
+            Spread::Inside
+        }
+    }
+}
+
 /// The folders of a file's meshes.
 #[derive(Default)]
 struct Folders {
@@ -663,17 +675,19 @@ pub(super) struct Whole {
 /// first file, or to the one that includes it.
 ///
 /// # Errors
-/// Faults of XML (W031, W055), a file that can't be read (W035).
+/// Faults of XML (W031), too many or too long files (W055), a file that can't be read (W035).
 pub(super) fn with_includes(
     source: &Source,
     path: &Path,
     files: &Files,
+    budget: &Budget,
 ) -> Result<Whole, Diagnostics> {
     let mut whole = Splice {
         text: String::new(),
         pieces: Vec::new(),
         main: path.parent().unwrap_or(Path::new("")),
         files,
+        budget,
     };
     whole.add(source, path, 0)?;
     Ok(Whole {
@@ -689,19 +703,18 @@ struct Splice<'a> {
     /// Folder of the first file.
     main: &'a Path,
     files: &'a Files,
+    budget: &'a Budget,
 }
 
 impl Splice<'_> {
     /// Adds a text; if it is included at a depth, only the elements below its root.
     fn add(&mut self, source: &Source, path: &Path, depth: usize) -> Result<(), Diagnostics> {
-        let document = xml::parse_model(source, &source.text)?;
-        if self.text.len() + source.text.len() > xml::LONGEST_MODEL {
-            let message = "with all files that it includes, this model is too long";
-            return Err(Diagnostic::error("W055", message)
+        self.budget.file(source.text.len()).map_err(|message| {
+            Diagnostic::error("W055", message)
                 .at(source, 0..0)
                 .help("include fewer files, each once")
-                .into());
-        }
+        })?;
+        let document = xml::parse_model(source, &source.text)?;
         let root = document.root_element();
         let range = match (depth, root.first_child(), root.last_child()) {
             (0, ..) => 0..source.text.len(),

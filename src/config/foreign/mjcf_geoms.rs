@@ -12,7 +12,7 @@ use crate::foreign::mjcf::Model;
 use crate::foreign::mjcf_compiler::{Item, MeshAsset, MjcfAttributes};
 use crate::foreign::mjcf_masks::collides;
 use crate::foreign::xml::{Bound, Node, Reader};
-use actcheck_data::{Matter, Mesh, Shape, TreeGeometry, TreeSolid};
+use actcheck_data::{Amount, Matter, Mesh, Shape, Spread, TreeGeometry, TreeSolid};
 
 /// Density of geoms: MuJoCo's default. Unit: kg/m³.
 const DENSITY: f64 = 1000.0;
@@ -109,9 +109,12 @@ impl<'a> Model<'a> {
         let mesh = attributes
             .get("mesh")
             .and_then(|name| self.compiler.meshes.get(name));
-        let is_shell = attributes.get("shellinertia") == Some("true")
-            || mesh.is_some_and(|mesh| mesh.is_shell);
-        if is_shell && attributes.get("type") == Some("ellipsoid") {
+        let spread = match (attributes.get("shellinertia"), mesh) {
+            (Some("true"), _) => Spread::Shell,
+            (_, Some(mesh)) => mesh.spread,
+            (_, None) => Spread::Inside,
+        };
+        if spread == Spread::Shell && attributes.get("type") == Some("ellipsoid") {
             let message = "the inertia of a hollow ellipsoid is not read".to_owned();
             reader.error("W035", geom, message, "give its body an `<inertial>`");
             return None;
@@ -122,12 +125,11 @@ impl<'a> Model<'a> {
                 .numbers::<1>(geom, written, Bound::NotNegative)
                 .map(|[number]| number)
         };
-        Some(match (number("mass"), is_shell) {
-            (Some(kg), false) => Matter::Mass(kg),
-            (Some(kg), true) => Matter::ShellMass(kg),
-            (None, false) => Matter::Density(number("density").unwrap_or(DENSITY)),
-            (None, true) => Matter::Shell(number("density").unwrap_or(DENSITY)),
-        })
+        let amount = match number("mass") {
+            Some(kg) => Amount::Mass(kg),
+            None => Amount::Density(number("density").unwrap_or(DENSITY)),
+        };
+        Some(Matter { amount, spread })
     }
 
     /// Returns a mesh of `<asset>`. Returns `None` after it has reported a fault.
@@ -140,9 +142,9 @@ impl<'a> Model<'a> {
                 scale: asset.scale,
             }),
             _ => {
-                let mesh = self.vertices(&asset, geom, reader)?;
                 let file = format!("<mesh name=\"{name}\">");
-                self.keep_mesh(&file, mesh);
+                let mesh = self.own_mesh(name, &asset, geom, reader)?;
+                self.keep_mesh(&file, &mesh);
                 Some(TreeGeometry::Mesh {
                     file,
                     scale: [1.0; 3],
@@ -151,7 +153,25 @@ impl<'a> Model<'a> {
         }
     }
 
-    fn asset(&self, name: &str, geom: Node, reader: &mut Reader) -> Option<MeshAsset> {
+    /// Returns a mesh in its own frame and at its own scale, which is computed once for all geoms.
+    /// Returns `None` after it has reported a fault.
+    fn own_mesh(
+        &self,
+        name: &str,
+        asset: &MeshAsset,
+        geom: Node,
+        reader: &mut Reader,
+    ) -> Option<Rc<Mesh>> {
+        if let Some(known) = self.meshes.borrow().get(name) {
+            return known.clone();
+        }
+        let mesh = self.vertices(asset, geom, reader).map(Rc::new);
+        let mut known = self.meshes.borrow_mut();
+        known.insert(name.to_owned(), mesh.clone());
+        mesh
+    }
+
+    fn asset(&self, name: &str, geom: Node, reader: &mut Reader) -> Option<Rc<MeshAsset>> {
         let found = self.compiler.meshes.get(name).cloned();
         if found.is_none() {
             let message = format!("there is no mesh `{name}` in `<asset>`");
@@ -219,7 +239,7 @@ impl<'a> Model<'a> {
             reader.error("W035", geom, message.to_owned(), help);
             return None;
         }
-        let mesh = self.vertices(&asset, geom, reader)?;
+        let mesh = self.own_mesh(name, &asset, geom, reader)?;
         let Some((pose, half)) = equivalent_box(&mesh) else {
             let message = format!("the mesh `{name}` has no volume to fit a primitive to");
             reader.error("W037", geom, message, "name a closed mesh");

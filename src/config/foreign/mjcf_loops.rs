@@ -9,6 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
+use crate::foreign::mjcf_budget::Budget;
 use crate::foreign::mjcf_compiler::{Compiler, Item};
 use crate::foreign::mjcf_couplings::{Couplings, Mimic, elements, not_linear};
 use crate::foreign::xml::{self, Bound, Node, Reader};
@@ -48,6 +49,13 @@ struct MjcfBody {
     parent: Option<usize>,
     pose: Isometry3<f64>,
     hinges: Vec<usize>,
+}
+
+/// What the bodies of a file are read with.
+struct Walk<'a, 'r> {
+    compiler: &'a Compiler,
+    budget: &'a Budget,
+    reader: &'a mut Reader<'r>,
 }
 
 /// Two points that coincide, each in the frame of its body; a body that is `None` is the world.
@@ -210,9 +218,15 @@ impl BodyTree {
     pub(super) fn read(root: Node, compiler: &Compiler, reader: &Reader) -> Self {
         let mut tree = Self::default();
         let mut unheard = Reader::new(reader.source);
+        let budget = Budget::default();
+        let mut walk = Walk {
+            compiler,
+            budget: &budget,
+            reader: &mut unheard,
+        };
         for worldbody in xml::children(root, "worldbody") {
             let class = worldbody.attribute("childclass");
-            tree.add((worldbody, None, ""), class, (compiler, &mut unheard));
+            tree.add((worldbody, None, ""), class, &mut walk);
         }
         tree
     }
@@ -241,9 +255,10 @@ impl BodyTree {
         &mut self,
         (node, body, suffix): (Node, Option<usize>, &str),
         class: Option<&str>,
-        (compiler, reader): (&Compiler, &mut Reader),
+        walk: &mut Walk<'_, '_>,
     ) {
-        let content = compiler.content(node, class, reader);
+        let compiler = walk.compiler;
+        let content = compiler.content(node, class, walk.budget, walk.reader);
         let items: Vec<Item<'_>> = content
             .into_iter()
             .map(|item| Item {
@@ -253,7 +268,7 @@ impl BodyTree {
             .collect();
         for item in items.iter().filter(|item| item.is("site")) {
             let attributes = compiler.attributes(item.node, item.class);
-            let at = item.shift * compiler.pose(&attributes, item.node, reader);
+            let at = item.shift * compiler.pose(&attributes, item.node, walk.reader);
             if let Some(name) = item.name() {
                 self.sites.insert(name, (body, at * Point3::origin()));
             }
@@ -262,14 +277,18 @@ impl BodyTree {
             let name = format!("{}{suffix}", node.attribute("name").unwrap_or("body"));
             let first = self.hinges.len();
             for item in items.iter().filter(|item| item.is("joint")) {
-                self.hinges.extend(hinge(item, &name, (compiler, reader)));
+                self.hinges
+                    .extend(hinge(item, &name, (compiler, walk.reader)));
             }
             self.bodies[body].hinges = (first..self.hinges.len()).collect();
             self.names.insert(name, body);
         }
         for item in items.iter().filter(|item| item.is("body")) {
+            if !walk.budget.body(item.node, walk.reader) {
+                return;
+            }
             let attributes = compiler.attributes(item.node, item.class);
-            let pose = item.shift * compiler.pose(&attributes, item.node, reader);
+            let pose = item.shift * compiler.pose(&attributes, item.node, walk.reader);
             self.bodies.push(MjcfBody {
                 parent: body,
                 pose,
@@ -277,7 +296,7 @@ impl BodyTree {
             });
             let inside = (item.node, Some(self.bodies.len() - 1), item.suffix.as_str());
             let class = item.node.attribute("childclass").or(item.class);
-            self.add(inside, class, (compiler, reader));
+            self.add(inside, class, walk);
         }
     }
 

@@ -7,7 +7,8 @@ use std::rc::Rc;
 use nalgebra::Isometry3;
 
 use crate::foreign::lookup::Lookup;
-use crate::foreign::mjcf::{Model, Purpose, unique, with_model};
+use crate::foreign::mjcf::{File, Model, Purpose, unique, with_model};
+use crate::foreign::mjcf_budget::Budget;
 use crate::foreign::xml::{self, Node, Reader};
 use actcheck_base::{Diagnostics, Source};
 use actcheck_data::{ModelTree, TreeLink};
@@ -30,8 +31,9 @@ pub(crate) fn read(
     path: &Path,
     lookup: &Lookup,
 ) -> Result<(Vec<Piece>, Source, Diagnostics), Diagnostics> {
-    let purpose = (Purpose::Object, 0);
-    with_model(source, path, lookup, purpose, |root, model, reader| {
+    let budget = Budget::default();
+    let file = File::first(path, lookup, &budget);
+    with_model(source, file, Purpose::Object, |root, model, reader| {
         let mut names = BTreeMap::new();
         let worlds = xml::children(root, "worldbody");
         worlds
@@ -54,7 +56,12 @@ fn pieces(
     };
     let mut found = Vec::new();
     let compiler = Rc::clone(&model.compiler);
-    for item in compiler.content(worldbody, worldbody.attribute("childclass"), reader) {
+    for item in compiler.content(
+        worldbody,
+        worldbody.attribute("childclass"),
+        model.file.budget,
+        reader,
+    ) {
         let mut own = model.alone();
         let world = own.unique("world");
         own.link(TreeLink::frame(world.clone(), reader.place(item.node)));

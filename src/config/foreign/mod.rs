@@ -21,6 +21,7 @@ pub(crate) mod lenient;
 mod lookup;
 mod mesh_file;
 pub(crate) mod mjcf;
+mod mjcf_budget;
 mod mjcf_compiler;
 mod mjcf_couplings;
 mod mjcf_geoms;
