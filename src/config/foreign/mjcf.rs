@@ -14,9 +14,12 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, Unit, UnitQuaternion
 use crate::foreign::geom_mass::{GeomMass, MeshMasses};
 use crate::foreign::lookup::{Lookup, beside};
 use crate::foreign::mjcf_budget::Budget;
-use crate::foreign::mjcf_compiler::{Compiler, Item, MjcfAttributes, Whole, with_includes};
-use crate::foreign::mjcf_couplings::{Couplings, elements};
-use crate::foreign::mjcf_masks::{Mask, collides};
+use crate::foreign::mjcf_compiler::{
+    Compiler, Item, MjcfAttributes, Whole, is_absolute, with_includes,
+};
+use crate::foreign::mjcf_couplings::Couplings;
+use crate::foreign::mjcf_elements;
+use crate::foreign::mjcf_masks::{Contacts, Mask, collides};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostic, Diagnostics, Source, SourceSpan};
 use actcheck_data::{
@@ -46,6 +49,7 @@ pub(crate) fn robot(
 ) -> Result<MjcfRead, Diagnostics> {
     let budget = Budget::default();
     whole(source, File::first(path, lookup, &budget), Purpose::Robot)
+        .map(|(built, text, said)| (built.tree, text, said))
 }
 
 /// Reads an object: its joints without a name of their own move its parts, and it moves freely
@@ -60,6 +64,7 @@ pub(crate) fn object(
 ) -> Result<MjcfRead, Diagnostics> {
     let budget = Budget::default();
     whole(source, File::first(path, lookup, &budget), Purpose::Object)
+        .map(|(built, text, said)| (built.tree, text, said))
 }
 
 /// The use of a model.
@@ -67,9 +72,23 @@ pub(crate) fn object(
 pub(super) enum Purpose {
     Robot,
     Object,
+    /// The objects are furniture.
+    World,
 }
 
-fn whole(source: &Source, file: File<'_>, purpose: Purpose) -> Result<MjcfRead, Diagnostics> {
+/// A model that has been read, and what a model that it is attached to needs to know.
+struct Built {
+    tree: ModelTree,
+    contacts: Contacts,
+    /// Positions of joints where the bodies are as the file places them, if these are not 0.
+    starts: BTreeMap<String, f64>,
+}
+
+fn whole(
+    source: &Source,
+    file: File<'_>,
+    purpose: Purpose,
+) -> Result<(Built, Source, Diagnostics), Diagnostics> {
     with_model(source, file, purpose, |root, mut model, reader| {
         let world = model.unique("world");
         model.link(TreeLink::frame(world.clone(), reader.place(root)));
@@ -84,12 +103,18 @@ fn whole(source: &Source, file: File<'_>, purpose: Purpose) -> Result<MjcfRead, 
         for worldbody in xml::children(root, "worldbody") {
             model.worldbody(worldbody, &world, reader);
         }
-        if purpose == Purpose::Robot {
-            model.add_passing(root);
-        }
+        model.finish(root, reader);
         model.weigh(reader);
         model.tree.name = root.attribute("model").unwrap_or("robot").to_owned();
-        model.tree
+        let own = model.couplings.starts.iter();
+        model
+            .starts
+            .extend(own.map(|(name, at)| (name.clone(), *at)));
+        Built {
+            tree: model.tree,
+            contacts: model.contacts,
+            starts: model.starts,
+        }
     })
 }
 
@@ -107,6 +132,7 @@ pub(super) fn with_model<T>(
     let root = document.root_element();
     let mut reader = Reader::new(&source);
     reader.pieces = pieces;
+    mjcf_elements::check(root, purpose, &mut reader);
     let compiler = Compiler::read(root, &mut reader);
     let model = Model {
         tree: ModelTree::default(),
@@ -116,7 +142,10 @@ pub(super) fn with_model<T>(
         names: BTreeMap::new(),
         joint_names: BTreeMap::new(),
         own: BTreeMap::new(),
-        masks: BTreeMap::new(),
+        contacts: Contacts::default(),
+        has_springs: false,
+        copies: BTreeMap::new(),
+        starts: BTreeMap::new(),
         meshes: Rc::default(),
         purpose,
         file,
@@ -184,8 +213,13 @@ pub(super) struct Model<'a> {
     /// The file's own bodies by the names of their links, and whether they have joints: those of
     /// attached models are not among them.
     own: BTreeMap<String, bool>,
-    /// The masks of each body's colliding geoms.
-    masks: BTreeMap<String, BTreeSet<Mask>>,
+    contacts: Contacts,
+    /// Whether a spring was reported.
+    has_springs: bool,
+    /// Joints that are copies, with their names and the ends of these.
+    copies: BTreeMap<String, (String, String)>,
+    /// Starts of the joints of attached models.
+    starts: BTreeMap<String, f64>,
     /// Meshes of the file that differ from those of their own files; `None` for those with a fault.
     pub(super) meshes: Rc<RefCell<BTreeMap<String, Option<Rc<Mesh>>>>>,
     purpose: Purpose,
@@ -208,7 +242,10 @@ impl Model<'_> {
             names: BTreeMap::new(),
             joint_names: BTreeMap::new(),
             own: BTreeMap::new(),
-            masks: BTreeMap::new(),
+            contacts: Contacts::default(),
+            has_springs: false,
+            copies: BTreeMap::new(),
+            starts: BTreeMap::new(),
             meshes: Rc::clone(&self.meshes),
             ..*self
         }
@@ -234,38 +271,53 @@ impl Model<'_> {
         self.tree.joints.push(joint);
     }
 
-    /// Adds the pairs of bodies that pass through each other: those that `<exclude>` names, and
-    /// those whose geoms never collide with each other.
-    fn add_passing(&mut self, root: Node) {
-        let mut passing: BTreeSet<[&str; 2]> = BTreeSet::new();
-        let excludes = elements(root, "contact").filter(|contact| contact.has_tag_name("exclude"));
-        for exclude in excludes {
-            if let (Some(first), Some(second)) =
-                (exclude.attribute("body1"), exclude.attribute("body2"))
-            {
-                passing.insert([first.min(second), first.max(second)]);
-            }
+    /// Adds what depends on all bodies: the contacts between them, and the couplings of joints.
+    fn finish(&mut self, root: Node, reader: &mut Reader) {
+        if self.purpose == Purpose::Robot {
+            self.contacts.read(root);
         }
-        let solid: Vec<(&String, &BTreeSet<Mask>)> = self
-            .masks
-            .iter()
-            .filter(|(_, masks)| !masks.is_empty())
+        if self.purpose == Purpose::Robot && self.file.depth == 0 {
+            let passing = self.contacts.passing(|body| self.names.contains_key(body));
+            self.tree.passing.extend(passing);
+        }
+        let couplings = Rc::clone(&self.couplings);
+        let joints = self.tree.joints.iter().map(|joint| joint.name.clone());
+        let joints: BTreeSet<String> = joints.collect();
+        // A name counts for all copies of a joint.
+        let written: BTreeSet<&str> = root
+            .descendants()
+            .filter(|node| node.has_tag_name("joint") || node.has_tag_name("freejoint"))
+            .filter_map(|joint| joint.attribute("name"))
             .collect();
-        for (idx, (first, of_first)) in solid.iter().enumerate() {
-            for (second, of_second) in &solid[idx + 1..] {
-                if !of_first
-                    .iter()
-                    .any(|mask| of_second.iter().any(|other| mask.meets(*other)))
-                {
-                    passing.insert([first.as_str(), second.as_str()]);
-                }
+        for named in &couplings.named {
+            if !joints.contains(&named.name) && !written.contains(named.name.as_str()) {
+                reader.found.push(named.unknown());
             }
         }
-        let known = passing
-            .into_iter()
-            .filter(|pair| pair.iter().all(|body| self.names.contains_key(*body)))
-            .map(|pair| pair.map(str::to_owned));
-        self.tree.passing.extend(known);
+        for joint in &mut self.tree.joints {
+            let (written, suffix) = match self.copies.get(&joint.name) {
+                Some((written, suffix)) => (written.as_str(), suffix.as_str()),
+                None => (joint.name.as_str(), ""),
+            };
+            let known = couplings.mimics.get(&joint.name);
+            let Some((leader, factor, offset)) = known.or(couplings.mimics.get(written)) else {
+                continue;
+            };
+            let copy = format!("{leader}{suffix}");
+            let leader = if joints.contains(&copy) {
+                &copy
+            } else {
+                leader
+            };
+            // The file that names joints of an attached model does not know where these start.
+            let start = |name: &str| self.starts.get(name).copied().unwrap_or(0.0);
+            joint.mimic = Some(TreeMimic {
+                leader: leader.clone(),
+                factor: *factor,
+                offset: offset + start(&joint.name) - factor * start(leader),
+                place: joint.place.clone(),
+            });
+        }
     }
 
     /// Adds the bodies of a world, and its solids, which are fixed.
@@ -287,7 +339,7 @@ impl Model<'_> {
 
     /// Adds the bodies, sites and cameras in a body. `shift` is the body's frame in the frame of
     /// its link.
-    fn children(
+    pub(super) fn children(
         &mut self,
         content: &[Item<'_>],
         link: &str,
@@ -302,17 +354,16 @@ impl Model<'_> {
                 "body" => self.body(item, link, &shift, reader),
                 "site" | "camera" => {
                     let Some(name) = item.name() else { continue };
-                    let pose = compiler.pose(&compiler.attributes(node, class), node, reader);
-                    let turned = if item.is("camera") {
-                        lens()
-                    } else {
-                        Isometry3::identity()
+                    let attributes = compiler.attributes(node, class);
+                    let pose = match item.is("camera") {
+                        true => compiler.pose(&attributes, node, reader) * lens(),
+                        false => compiler.site(&attributes, node, reader),
                     };
                     // A name that a body has, too, is that of the body's link.
                     let is_taken = self.bodies.contains(&name);
                     let ending = if is_taken { "_frame" } else { "" };
                     let name = self.unique(&format!("{name}{ending}"));
-                    self.frame(&name, link, shift * pose * turned, reader.place(node));
+                    self.frame(&name, link, shift * pose, reader.place(node));
                 }
                 "attach" => self.attach(item, link, &shift, reader),
                 "composite" | "flexcomp" => {
@@ -355,10 +406,10 @@ impl Model<'_> {
             ..self.file
         };
         let read = whole(&source, attached, self.purpose);
-        let tree = match read {
-            Ok((tree, _, said)) => {
+        let built = match read {
+            Ok((built, _, said)) => {
                 reader.found.extend(said);
-                tree
+                built
             }
             Err(faults) => return reader.found.extend(faults),
         };
@@ -372,14 +423,22 @@ impl Model<'_> {
             shift * self.compiler.pose(&attributes, node, reader)
         };
         let body = node.attribute("body");
-        let folder = file.rsplit_once('/').map_or("", |(folder, _)| folder);
+        // Its meshes are named from its own folder.
+        let inside = path.parent().and_then(|own| own.strip_prefix(folder).ok());
+        let folder = inside.map_or_else(String::new, |inside| inside.display().to_string());
         let graft = Graft {
             prefix: &prefix,
-            folder,
+            folder: &folder,
             body,
         };
-        match graft.of(tree) {
-            Some(tree) => self.graft(tree, link, &pose),
+        match graft.of(built.tree) {
+            Some(tree) => {
+                self.contacts.attach(built.contacts, &prefix);
+                let starts = built.starts.into_iter();
+                self.starts
+                    .extend(starts.map(|(joint, at)| (format!("{prefix}{joint}"), at)));
+                self.graft(tree, link, &pose);
+            }
             None => refused_body(node, body.unwrap_or_default(), &path, reader),
         }
     }
@@ -403,6 +462,7 @@ impl Model<'_> {
         for joint in tree.joints {
             unique(&mut self.joint_names, &joint.name);
             let is_first = Some(&joint.parent) == root_name.as_ref();
+            let joint = self.driven(joint);
             self.tree.joints.push(if is_first {
                 TreeJoint {
                     parent: link.to_owned(),
@@ -421,6 +481,30 @@ impl Model<'_> {
         self.tree.inline_meshes.extend(tree.inline_meshes);
     }
 
+    /// A joint of an attached model, with the effort and the range of this file's actuators.
+    fn driven(&self, mut joint: TreeJoint) -> TreeJoint {
+        if let Some(effort) = self.couplings.efforts.get(&joint.name) {
+            let is_stated = joint.effort > 0.0 && joint.effort != EFFORT;
+            joint.effort = if is_stated {
+                joint.effort.min(*effort)
+            } else {
+                *effort
+            };
+        }
+        let slides = joint.motion == TreeMotion::Prismatic;
+        let is_free = match joint.motion {
+            TreeMotion::Continuous => true,
+            _ => slides && [joint.lower, joint.upper] == [-SLIDES_M, SLIDES_M],
+        };
+        if let Some(range) = self.couplings.ranges.get(&joint.name).filter(|_| is_free) {
+            [joint.lower, joint.upper] = *range;
+            if !slides {
+                joint.motion = TreeMotion::Revolute;
+            }
+        }
+        joint
+    }
+
     pub(super) fn body(
         &mut self,
         item: &Item<'_>,
@@ -430,7 +514,7 @@ impl Model<'_> {
     ) {
         let compiler = Rc::clone(&self.compiler);
         let body = item.node;
-        if !self.file.budget.body(body, reader) {
+        if !self.file.budget.enter(body, reader) {
             return;
         }
         let class = body.attribute("childclass").or(item.class);
@@ -490,7 +574,7 @@ impl Model<'_> {
         }
         if joints.is_empty() {
             let free = inside.iter().any(|joint| is_free(&joint));
-            let (motion, ending) = if free && self.purpose == Purpose::Robot {
+            let (motion, ending) = if free && self.purpose != Purpose::Object {
                 (TreeMotion::Floating, "free")
             } else {
                 (TreeMotion::Fixed, "fixed")
@@ -503,14 +587,16 @@ impl Model<'_> {
         }
         let [solids, visuals] = self.geoms(&inside, &own, reader);
         if self.purpose == Purpose::Robot {
-            let geoms = inside
-                .iter()
-                .filter(|geom| geom.is("geom"))
-                .map(|geom| compiler.attributes(geom.node, geom.class));
-            let masks = geoms
-                .filter(|geom| collides(geom, &compiler))
-                .map(|geom| Mask::of(&geom));
-            self.masks.insert(name.clone(), masks.collect());
+            let mut masks = BTreeSet::new();
+            for geom in inside.iter().filter(|geom| geom.is("geom")) {
+                let attributes = compiler.attributes(geom.node, geom.class);
+                if collides(&attributes, &compiler) {
+                    masks.insert(Mask::of(&attributes));
+                }
+                let bodies = &mut self.contacts.bodies;
+                bodies.extend(geom.name().map(|geom| (geom, name.clone())));
+            }
+            self.contacts.masks.insert(name.clone(), masks);
         }
         let stated = inside
             .iter()
@@ -525,6 +611,7 @@ impl Model<'_> {
             place,
         });
         self.children(&inside, &name, &own, reader);
+        self.file.budget.leave();
     }
 
     /// Adds a joint. Returns `None` after it has reported a fault.
@@ -568,12 +655,16 @@ impl Model<'_> {
             );
             return None;
         };
-        let range = self.range(joint, attributes, &name, slides, reader)?;
+        let names = [&name, joint.attribute("name").unwrap_or(&name)];
+        let range = self.range(joint, attributes, (names, slides), reader);
         let (motion, [lower, upper]) = match (range, slides) {
             (Some(range), _) => (motion, range),
             (None, true) => (motion, [-SLIDES_M, SLIDES_M]),
             (None, false) => (TreeMotion::Continuous, [f64::NEG_INFINITY, f64::INFINITY]),
         };
+        // A name that elements use counts for all copies of the joint.
+        let written = joint.attribute("name").unwrap_or(&name);
+        self.check_spring(joint, attributes, &name, reader);
         let start = self.couplings.start(&name);
         let origin = match start {
             0.0 => origin,
@@ -581,9 +672,12 @@ impl Model<'_> {
             _ => origin * UnitQuaternion::from_axis_angle(&direction, -start),
         };
         let place = reader.place(joint);
-        let mimic = self.couplings.mimics.get(&name).cloned();
-        let effort = self.effort(joint, attributes, &name, reader);
+        let effort = self.effort(joint, attributes, [&name, written], reader);
         let unique = unique(&mut self.joint_names, &name);
+        if !item.suffix.is_empty() {
+            let copy = (written.to_owned(), item.suffix.clone());
+            self.copies.insert(unique.clone(), copy);
+        }
         self.tree.joints.push(TreeJoint {
             motion,
             axis,
@@ -591,59 +685,63 @@ impl Model<'_> {
             upper,
             effort,
             velocity: VELOCITY[usize::from(slides)],
-            damping: attributes.number("damping").unwrap_or(0.0),
+            damping: attributes.number("damping", reader).unwrap_or(0.0),
             // Robots overcome it with their motors.
             friction: attributes
-                .number("frictionloss")
-                .filter(|_| self.purpose == Purpose::Object)
+                .number("frictionloss", reader)
+                .filter(|_| self.purpose != Purpose::Robot)
                 .unwrap_or(0.0),
-            mimic: mimic.map(|(leader, factor, offset)| TreeMimic {
-                leader,
-                factor,
-                offset,
-                place: place.clone(),
-            }),
             ..TreeJoint::fixed(unique, [parent, child], origin, place)
         });
         Some(())
     }
 
+    /// Reports a spring: it is an error of an object, and an unknown force of a robot's motors.
+    fn check_spring(
+        &mut self,
+        joint: Node,
+        attributes: &MjcfAttributes<'_>,
+        name: &str,
+        reader: &mut Reader,
+    ) {
+        for key in ["springref", "ref"] {
+            attributes.number(key, reader);
+        }
+        let stiffness = attributes.number("stiffness", reader).unwrap_or(0.0);
+        let is_first = !self.has_springs;
+        if stiffness <= 0.0 {
+            return;
+        }
+        self.has_springs = true;
+        if self.purpose != Purpose::Robot {
+            let message = format!("the spring of the joint `{name}` can't be simulated");
+            let help =
+                "the model would be another one without it: remove `stiffness` if that is meant";
+            reader.error("W035", joint, message, help);
+        } else if is_first {
+            let message = format!("the spring of the joint `{name}` is left out");
+            let help = "springs decide only where closed loops leave a choice; those of other joints \
+                        are left out, too";
+            reader.warning("W036", joint, message, help);
+        }
+    }
+
     /// Returns the limits of a joint: its own, otherwise those of its position servo, if it has
-    /// any. Returns `None` after it has reported a fault.
+    /// any.
     fn range(
         &self,
         joint: Node,
         attributes: &MjcfAttributes<'_>,
-        name: &str,
-        slides: bool,
+        ([name, written], slides): ([&str; 2], bool),
         reader: &mut Reader,
-    ) -> Option<Option<[f64; 2]>> {
-        let range = match attributes.get("range") {
-            Some(text) => Some(reader.numbers::<2>(joint, text, Bound::Finite)?),
-            None => None,
-        };
-        if let Some([lower, upper]) = range.filter(|[lower, upper]| lower > upper) {
-            let message = format!(
-                "the joint `{name}` has a lower limit of {lower} above its upper limit of {upper}"
-            );
-            reader.error(
-                "W034",
-                joint,
-                message,
-                "write the smaller number of `range` first",
-            );
-            return None;
-        }
-        let limited = match attributes.get("limited") {
-            Some("true") => true,
-            Some("false") => false,
-            _ => range.is_some(),
-        };
+    ) -> Option<[f64; 2]> {
+        let range = self
+            .compiler
+            .limits(joint, attributes, ["range", "limited"], reader);
         let unit = if slides { 1.0 } else { self.compiler.angle };
-        let own = range
-            .filter(|_| limited)
-            .map(|range| range.map(|end| end * unit));
-        Some(own.or(self.couplings.ranges.get(name).copied()))
+        let own = range.map(|range| range.map(|end| end * unit));
+        let of_servo = &self.couplings.ranges;
+        own.or_else(|| of_servo.get(name).or(of_servo.get(written)).copied())
     }
 
     /// Returns the largest effort of a joint: that of its actuators, but at most its own limit.
@@ -651,25 +749,21 @@ impl Model<'_> {
         &self,
         joint: Node,
         attributes: &MjcfAttributes<'_>,
-        name: &str,
+        [name, written]: [&str; 2],
         reader: &mut Reader,
     ) -> f64 {
-        let own = attributes
-            .get("actuatorfrcrange")
-            .filter(|_| attributes.get("actuatorfrclimited") != Some("false"))
-            .and_then(|text| reader.numbers::<2>(joint, text, Bound::Finite))
-            .map(|[lower, upper]| f64::max(-lower, upper));
-        let of_actuators = self.couplings.efforts.get(name).copied();
+        let keys = ["actuatorfrcrange", "actuatorfrclimited"];
+        let own = self.compiler.limits(joint, attributes, keys, reader);
+        let own = own.map(|[lower, upper]| f64::max(-lower, upper));
+        let efforts = &self.couplings.efforts;
+        let of_actuators = efforts.get(name).or(efforts.get(written)).copied();
         let effort = [own, of_actuators]
             .into_iter()
             .flatten()
             .filter(|effort| *effort > 0.0)
             .reduce(f64::min);
-        let unstated = if self.couplings.is_passive(name) {
-            0.0
-        } else {
-            EFFORT
-        };
+        let is_passive = [name, written].map(|name| self.couplings.is_passive(name));
+        let unstated = if is_passive == [true; 2] { 0.0 } else { EFFORT };
         effort.unwrap_or(unstated)
     }
 
@@ -826,7 +920,7 @@ impl Graft<'_> {
                 if let actcheck_data::TreeGeometry::Mesh { file, .. } = &mut solid.geometry {
                     if tree.inline_meshes.contains_key(file) {
                         file.insert_str(0, self.prefix);
-                    } else if !self.folder.is_empty() && !Path::new(file).is_absolute() {
+                    } else if !self.folder.is_empty() && !is_absolute(file) {
                         *file = format!("{}/{file}", self.folder);
                     }
                 }

@@ -10,8 +10,10 @@ use crate::foreign::xml::{self, Node, Reader};
 const MOST_BODIES: usize = 1_000;
 /// Most elements in its bodies, counted in the same way.
 const MOST_ELEMENTS: usize = 10_000;
-/// Most frames and copies inside each other: elements are read by functions that call themselves.
+/// Most frames and copies inside each other, and most bodies: they are read by functions that call
+/// themselves.
 const DEEPEST_FRAME: usize = 100;
+const DEEPEST_BODY: usize = 200;
 /// Most included and attached files, each as often as it is read.
 const MOST_FILES: usize = 1_000;
 
@@ -19,6 +21,8 @@ const MOST_FILES: usize = 1_000;
 #[derive(Debug, Default)]
 pub(super) struct Budget {
     bodies: Cell<usize>,
+    /// Bodies that have been entered and not left.
+    depth: Cell<usize>,
     elements: Cell<usize>,
     files: Cell<usize>,
     /// Length of the texts of all files.
@@ -28,10 +32,24 @@ pub(super) struct Budget {
 }
 
 impl Budget {
-    /// Counts a body. Returns false if there are too many; the first time, it reports W055.
-    pub(super) fn body(&self, node: Node, reader: &mut Reader) -> bool {
+    /// Counts a body, which is to be left by [`Budget::leave`]. Returns false if there are too many;
+    /// the first time, it reports W055.
+    pub(super) fn enter(&self, node: Node, reader: &mut Reader) -> bool {
+        if self.depth.get() >= DEEPEST_BODY {
+            return self.refuse(
+                &format!("{DEEPEST_BODY} bodies in each other"),
+                node,
+                reader,
+            );
+        }
         let what = format!("{MOST_BODIES} bodies");
-        self.counts(&self.bodies, MOST_BODIES, &what, node, reader)
+        let is_entered = self.counts(&self.bodies, MOST_BODIES, &what, node, reader);
+        self.depth.set(self.depth.get() + usize::from(is_entered));
+        is_entered
+    }
+
+    pub(super) fn leave(&self) {
+        self.depth.set(self.depth.get().saturating_sub(1));
     }
 
     /// Counts an element in a body, or a copy, in so many frames. Returns false if there are too

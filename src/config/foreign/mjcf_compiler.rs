@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use nalgebra::{
-    Isometry3, Matrix3, Quaternion, Rotation3, Translation3, Unit, UnitQuaternion, Vector3,
+    Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, Unit, UnitQuaternion, Vector3,
 };
 
 use crate::foreign::lookup::beside;
@@ -46,6 +46,11 @@ const ACTUATORS: [&str; 9] = [
     "adhesion",
 ];
 
+/// Attributes of rotations other than `quat`.
+const TURNS: [&str; 4] = ["axisangle", "euler", "xyaxes", "zaxis"];
+/// Shapes that may be stated by their ends.
+const LONG: [&str; 4] = ["capsule", "cylinder", "box", "ellipsoid"];
+
 type Values = BTreeMap<String, String>;
 
 /// Settings, default classes and meshes of a file.
@@ -63,6 +68,8 @@ pub(super) struct Compiler {
     pub(super) paired: BTreeSet<String>,
     /// The basis of masses.
     pub(super) masses: MassRules,
+    /// Whether a range is a limit unless the file says otherwise.
+    limits_itself: bool,
     /// Whether primitives are fitted to the boxes around meshes instead of to their moments.
     pub(super) fits_boxes: bool,
 }
@@ -146,10 +153,23 @@ impl<'a> MjcfAttributes<'a> {
             .map(str::trim)
     }
 
-    /// Returns the first number of an attribute; `None` if there is none, or it is not a number.
-    pub(super) fn number(&self, name: &str) -> Option<f64> {
-        let number: f64 = self.get(name)?.split_whitespace().next()?.parse().ok()?;
-        number.is_finite().then_some(number)
+    /// Returns the rotation that is not a quaternion, with its name: its own, otherwise that of its
+    /// class.
+    fn turn(&self) -> Option<(&'static str, &'a str)> {
+        let own = TURNS
+            .into_iter()
+            .find_map(|key| Some((key, self.node.attribute(key)?)));
+        own.or_else(|| {
+            let of_class = |key| Some((key, self.defaults?.get(key)?.as_str()));
+            TURNS.into_iter().find_map(of_class)
+        })
+    }
+
+    /// Returns the first number of an attribute; `None` if there is none, and after it has reported
+    /// a fault.
+    pub(super) fn number(&self, name: &str, reader: &mut Reader) -> Option<f64> {
+        let numbers = reader.list(self.node, name, self.get(name)?)?;
+        numbers.first().copied()
     }
 }
 
@@ -185,6 +205,7 @@ impl Compiler {
             models: BTreeMap::new(),
             paired: BTreeSet::new(),
             masses: MassRules::default(),
+            limits_itself: true,
             fits_boxes: false,
         };
         if root.tag_name().name() != "mujoco" {
@@ -232,7 +253,14 @@ impl Compiler {
             _ => {}
         }
         if let Some(sequence) = settings.attribute("eulerseq") {
-            sequence.clone_into(&mut self.euler);
+            let is_axis = |letter: char| "xyzXYZ".contains(letter);
+            if sequence.chars().count() == 3 && sequence.chars().all(is_axis) {
+                sequence.clone_into(&mut self.euler);
+            } else {
+                let message = format!("`eulerseq` can't be `{sequence}`");
+                let help = "write three letters of x, y, z, X, Y and Z";
+                reader.error("W034", settings, message, help);
+            }
         }
         let written = settings
             .attribute("meshdir")
@@ -242,6 +270,9 @@ impl Compiler {
         }
         if let Some(strips) = settings.attribute("strippath") {
             folders.strips = strips == "true";
+        }
+        if let Some(limits) = settings.attribute("autolimits") {
+            self.limits_itself = limits != "false";
         }
         self.fits_boxes |= settings.attribute("fitaabb") == Some("true");
         if settings.attribute("coordinate") == Some("global") {
@@ -286,9 +317,7 @@ impl Compiler {
         let scale = numbers("scale").and_then(|text| reader.numbers(node, text, Bound::Finite));
         let position =
             numbers("refpos").and_then(|text| reader.numbers::<3>(node, text, Bound::Finite));
-        let turn = numbers("refquat")
-            .and_then(|text| reader.numbers::<4>(node, text, Bound::Finite))
-            .and_then(|[w, x, y, z]| UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-9));
+        let turn = numbers("refquat").and_then(|text| quaternion(node, text, reader));
         let mut mesh = MeshAsset {
             scale: scale.unwrap_or([1.0; 3]),
             origin: Isometry3::from_parts(
@@ -372,6 +401,10 @@ impl Compiler {
             let values = own
                 .entry(kind(element.tag_name().name()).to_owned())
                 .or_default();
+            // One rotation replaces another one.
+            if TURNS.iter().any(|key| element.has_attribute(*key)) {
+                values.retain(|key, _| !TURNS.contains(&key.as_str()));
+            }
             values.extend(
                 element
                     .attributes()
@@ -493,6 +526,54 @@ impl Compiler {
         Some((count, step))
     }
 
+    /// Returns the two ends of a range of an element, unless it is switched off: without a word
+    /// about it, an empty range is none. Returns `None` after it has reported a fault, too.
+    pub(super) fn limits(
+        &self,
+        node: Node,
+        attributes: &MjcfAttributes<'_>,
+        [range, limited]: [&str; 2],
+        reader: &mut Reader,
+    ) -> Option<[f64; 2]> {
+        let written = attributes.get(range);
+        let ends = match written {
+            Some(text) => reader.numbers::<2>(node, text, Bound::Finite)?,
+            None => [0.0; 2],
+        };
+        let is_range = ends[0] < ends[1];
+        match attributes.get(limited) {
+            Some("false") => None,
+            Some("true") => {
+                if !is_range {
+                    let message = format!("`{limited}` is true, but `{range}` is no range");
+                    let help = "write two numbers, the smaller one first";
+                    reader.error("W034", node, message, help);
+                }
+                is_range.then_some(ends)
+            }
+            None | Some("auto") => {
+                if ends[0] > ends[1] {
+                    let message = format!(
+                        "`{range}` has a lower limit of {} above its upper limit of {}",
+                        ends[0], ends[1]
+                    );
+                    reader.error("W034", node, message, "write the smaller number first");
+                } else if is_range && !self.limits_itself {
+                    let message = format!("`{range}` has no effect without `{limited}`");
+                    let help =
+                        format!("write `{limited}=\"true\"`, or remove `autolimits=\"false\"`");
+                    reader.error("W034", node, message, help);
+                }
+                is_range.then_some(ends)
+            }
+            Some(other) => {
+                let message = format!("`{limited}` can't be `{other}`");
+                reader.error("W034", node, message, "write `true`, `false` or `auto`");
+                None
+            }
+        }
+    }
+
     /// Returns the pose of an element; the identity after it has reported a fault.
     pub(super) fn pose(
         &self,
@@ -510,37 +591,85 @@ impl Compiler {
         )
     }
 
+    /// Returns a rotation. Any other attribute than `quat` decides before it, even if it is that of
+    /// the class. Returns `None` if there is none, and after it has reported a fault.
     fn rotation(
         &self,
         attributes: &MjcfAttributes<'_>,
         node: Node,
         reader: &mut Reader,
     ) -> Option<UnitQuaternion<f64>> {
-        if let Some(text) = attributes.get("quat") {
-            let [w, x, y, z] = reader.numbers(node, text, Bound::Finite)?;
-            return UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-9);
+        let is_own = |key: &&str| node.has_attribute(*key);
+        if std::iter::once("quat").chain(TURNS).filter(is_own).count() > 1 {
+            let message = "this element states its orientation twice".to_owned();
+            let help = "write one of `quat`, `axisangle`, `euler`, `xyaxes` and `zaxis`";
+            reader.error("W034", node, message, help);
+            return None;
         }
-        if let Some(text) = attributes.get("axisangle") {
-            let [x, y, z, angle] = reader.numbers(node, text, Bound::Finite)?;
-            let axis = Unit::try_new(Vector3::new(x, y, z), 1e-9)?;
-            return Some(UnitQuaternion::from_axis_angle(&axis, angle * self.angle));
+        let Some((key, text)) = attributes.turn() else {
+            return quaternion(node, attributes.get("quat")?, reader);
+        };
+        let found = match key {
+            "axisangle" => {
+                let [x, y, z, angle] = reader.numbers(node, text, Bound::Finite)?;
+                let axis = Unit::try_new(Vector3::new(x, y, z), 1e-9);
+                axis.map(|axis| UnitQuaternion::from_axis_angle(&axis, angle * self.angle))
+            }
+            "euler" => Some(self.turned(reader.numbers(node, text, Bound::Finite)?)),
+            "xyaxes" => {
+                let [a, b, c, d, e, f] = reader.numbers(node, text, Bound::Finite)?;
+                of_axes(Vector3::new(a, b, c), Vector3::new(d, e, f))
+            }
+            _ => {
+                let axis = reader.numbers::<3>(node, text, Bound::Finite)?;
+                let axis = Vector3::from(axis).try_normalize(1e-9);
+                axis.map(|axis| upright_to(&axis))
+            }
+        };
+        if found.is_none() {
+            let message = format!("`{key}` must not be zero, and its axes must differ");
+            reader.error("W034", node, message, "leave it out, or state another axis");
         }
-        if let Some(text) = attributes.get("euler") {
-            let angles: [f64; 3] = reader.numbers(node, text, Bound::Finite)?;
-            return Some(self.turned(angles));
+        found
+    }
+
+    /// Returns the pose between the two points of `fromto`, whose axis z points from the second to
+    /// the first, and half of their distance; `None` without `fromto`, and after it has reported a
+    /// fault.
+    pub(super) fn between(
+        &self,
+        attributes: &MjcfAttributes<'_>,
+        node: Node,
+        reader: &mut Reader,
+    ) -> Option<(Isometry3<f64>, f64)> {
+        let text = attributes.get("fromto")?;
+        if !LONG.contains(&attributes.get("type").unwrap_or("sphere")) {
+            let message =
+                "`fromto` belongs to capsules, cylinders, boxes and ellipsoids".to_owned();
+            reader.error("W034", node, message, "state the `type` of the shape");
+            return None;
         }
-        if let Some(text) = attributes.get("xyaxes") {
-            let [a, b, c, d, e, f] = reader.numbers(node, text, Bound::Finite)?;
-            let x = Vector3::new(a, b, c).try_normalize(1e-9)?;
-            let y = Vector3::new(d, e, f);
-            let y = (y - x * x.dot(&y)).try_normalize(1e-9)?;
-            let axes = Matrix3::from_columns(&[x, y, x.cross(&y)]);
-            return Some(UnitQuaternion::from_rotation_matrix(
-                &Rotation3::from_matrix_unchecked(axes),
-            ));
+        let [ax, ay, az, bx, by, bz] = reader.numbers(node, text, Bound::Finite)?;
+        let (a, b) = (Point3::new(ax, ay, az), Point3::new(bx, by, bz));
+        let middle = Translation3::from(nalgebra::center(&a, &b).coords);
+        let turned = upright_to(&(a - b));
+        Some((Isometry3::from_parts(middle, turned), (b - a).norm() / 2.0))
+    }
+
+    /// Returns the pose of a site: as that of a geom, it may follow from two points.
+    pub(super) fn site(
+        &self,
+        attributes: &MjcfAttributes<'_>,
+        node: Node,
+        reader: &mut Reader,
+    ) -> Isometry3<f64> {
+        match attributes.get("fromto") {
+            Some(_) => {
+                let between = self.between(attributes, node, reader);
+                between.map(|(pose, _)| pose).unwrap_or_default()
+            }
+            None => self.pose(attributes, node, reader),
         }
-        let [x, y, z] = reader.numbers(node, attributes.get("zaxis")?, Bound::Finite)?;
-        UnitQuaternion::rotation_between(&Vector3::z(), &Vector3::new(x, y, z))
     }
 
     /// Rotations about the axes of the file's sequence: lower-case ones turn with the body,
@@ -580,6 +709,34 @@ fn spread(node: Node, attributes: &MjcfAttributes<'_>, reader: &mut Reader) -> S
     }
 }
 
+/// Reads a quaternion. Returns `None` after it has reported a fault.
+fn quaternion(node: Node, text: &str, reader: &mut Reader) -> Option<UnitQuaternion<f64>> {
+    let [w, x, y, z] = reader.numbers(node, text, Bound::Finite)?;
+    let found = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-9);
+    if found.is_none() {
+        let message = "a quaternion must not be zero".to_owned();
+        reader.error("W034", node, message, "write `1 0 0 0` for no rotation");
+    }
+    found
+}
+
+/// The rotation whose axis x is the first, and whose axis y is as near to the second as can be.
+fn of_axes(x: Vector3<f64>, y: Vector3<f64>) -> Option<UnitQuaternion<f64>> {
+    let x = x.try_normalize(1e-9)?;
+    let y = (y - x * x.dot(&y)).try_normalize(1e-9)?;
+    let axes = Matrix3::from_columns(&[x, y, x.cross(&y)]);
+    Some(UnitQuaternion::from_rotation_matrix(
+        &Rotation3::from_matrix_unchecked(axes),
+    ))
+}
+
+/// The shortest rotation of the axis z to another one; downwards, that about x.
+fn upright_to(axis: &Vector3<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::rotation_between(&Vector3::z(), axis).unwrap_or_else(|| {
+        UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
+    })
+}
+
 /// The folders of a file's meshes.
 #[derive(Default)]
 struct Folders {
@@ -592,6 +749,9 @@ impl Folders {
     fn path(&self, file: &str) -> String {
         let last = file.rsplit(['/', '\\']).next().unwrap_or(file);
         let file = if self.strips { last } else { file };
+        if is_absolute(file) {
+            return file.to_owned();
+        }
         format!("{}{file}", self.meshes)
     }
 }
@@ -632,6 +792,12 @@ fn state_gains(kind: &str, values: &mut Values) {
     ] {
         values.insert(key.to_owned(), value);
     }
+}
+
+/// Whether a path or URI has a folder of its own, on this machine or another one.
+pub(super) fn is_absolute(path: &str) -> bool {
+    let has_drive = path.as_bytes().get(1) == Some(&b':');
+    path.starts_with(['/', '\\']) || has_drive || path.contains("://")
 }
 
 /// The name of a file without its folders and its ending.

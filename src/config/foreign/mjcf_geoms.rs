@@ -1,17 +1,16 @@
 //! Geoms of bodies in MJCF, with their shapes, masses and friction.
 
-use std::f64::consts::PI;
 use std::rc::Rc;
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3};
 
 use crate::foreign::geom_mass::equivalent_box;
 use crate::foreign::geometry::Shapes;
 use crate::foreign::hull::convex_hull;
 use crate::foreign::mjcf::Model;
-use crate::foreign::mjcf_compiler::{Item, MeshAsset, MjcfAttributes};
-use crate::foreign::mjcf_masks::collides;
-use crate::foreign::xml::{Bound, Node, Reader};
+use crate::foreign::mjcf_compiler::{Compiler, Item, MeshAsset, MjcfAttributes};
+use crate::foreign::mjcf_masks::{Mask, collides};
+use crate::foreign::xml::{Bound, LONGEST, Node, Reader};
 use actcheck_data::{Amount, Matter, Mesh, Shape, Spread, TreeGeometry, TreeSolid};
 
 /// Density of geoms: MuJoCo's default. Unit: kg/m³.
@@ -55,6 +54,7 @@ impl<'a> Model<'a> {
     ) -> Option<TreeSolid> {
         let geom = item.node;
         let is_solid = collides(attributes, &self.compiler);
+        Mask::check(geom, attributes, reader);
         let kind = match attributes.get("type") {
             Some(kind) => kind,
             None if attributes.get("mesh").is_some() => "mesh",
@@ -76,7 +76,7 @@ impl<'a> Model<'a> {
                 (self.mesh(name, geom, reader)?, None)
             }
             _ if attributes.get("mesh").is_some() => self.fitted(kind, geom, attributes, reader)?,
-            _ => primitive(kind, geom, attributes, reader)?,
+            _ => primitive(kind, geom, attributes, &self.compiler, reader)?,
         };
         Some(TreeSolid {
             // A geom between two points has its pose from these.
@@ -87,9 +87,10 @@ impl<'a> Model<'a> {
             },
             geometry,
             matter: self.matter(geom, attributes, reader),
+            // MuJoCo takes a negative one for 0.
             friction: attributes
-                .number("friction")
-                .filter(|number| *number >= 0.0),
+                .number("friction", reader)
+                .map(|sliding| sliding.max(0.0)),
             place: reader.place(geom),
         })
     }
@@ -102,7 +103,10 @@ impl<'a> Model<'a> {
         reader: &mut Reader,
     ) -> Option<Matter> {
         let [first, last] = self.compiler.masses.groups;
-        let group = attributes.number("group").unwrap_or(0.0);
+        let group = match attributes.get("group") {
+            Some(text) => reader.numbers::<1>(geom, text, Bound::Finite)?[0],
+            None => 0.0,
+        };
         if group < first || group > last {
             return None;
         }
@@ -119,15 +123,15 @@ impl<'a> Model<'a> {
             reader.error("W035", geom, message, "give its body an `<inertial>`");
             return None;
         }
-        let mut number = |key: &str| {
+        let mut number = |key: &str, bound: Bound| {
             let written = attributes.get(key)?;
             reader
-                .numbers::<1>(geom, written, Bound::NotNegative)
+                .numbers::<1>(geom, written, bound)
                 .map(|[number]| number)
         };
-        let amount = match number("mass") {
+        let amount = match number("mass", Bound::Mass) {
             Some(kg) => Amount::Mass(kg),
-            None => Amount::Density(number("density").unwrap_or(DENSITY)),
+            None => Amount::Density(number("density", Bound::Mass).unwrap_or(DENSITY)),
         };
         Some(Matter { amount, spread })
     }
@@ -245,7 +249,10 @@ impl<'a> Model<'a> {
             reader.error("W037", geom, message, "name a closed mesh");
             return None;
         };
-        let scale = attributes.number("fitscale").unwrap_or(1.0);
+        let scale = match attributes.get("fitscale") {
+            Some(text) => reader.numbers::<1>(geom, text, Bound::Length)?[0],
+            None => 1.0,
+        };
         let [x, y, z] = half.map(|half| half * scale);
         let radius = (x + y) / 2.0;
         let geometry = match kind {
@@ -275,24 +282,20 @@ fn primitive(
     kind: &str,
     geom: Node,
     attributes: &MjcfAttributes<'_>,
+    compiler: &Compiler,
     reader: &mut Reader,
 ) -> Option<Placed> {
-    let size: Vec<f64> = attributes
-        .get("size")
-        .unwrap_or_default()
-        .split_whitespace()
-        .filter_map(|word| word.parse().ok())
-        .collect();
-    let ends = match attributes.get("fromto") {
-        Some(text) if kind != "sphere" => Some(reader.numbers::<6>(geom, text, Bound::Finite)?),
-        _ => None,
+    let size: Vec<f64> = reader.list(geom, "size", attributes.get("size").unwrap_or_default())?;
+    let between = match attributes.get("fromto") {
+        Some(_) => Some(compiler.between(attributes, geom, reader)?),
+        None => None,
     };
-    let wanted = match (kind, ends) {
+    let wanted = match (kind, between) {
         ("sphere", _) | (_, Some(_)) => 1,
         ("cylinder" | "capsule", None) => 2,
         _ => 3,
     };
-    let is_possible = |number: &f64| number.is_finite() && *number > 0.0;
+    let is_possible = |number: &f64| *number > 0.0 && *number <= LONGEST;
     if size.len() < wanted || !size[..wanted].iter().all(is_possible) {
         let message =
             format!("a geom of the type {kind} needs {wanted} positive numbers in `size`");
@@ -300,7 +303,6 @@ fn primitive(
         reader.error("W034", geom, message, help);
         return None;
     }
-    let between = ends.map(between);
     let [x, y, z] = match (&between, wanted) {
         // Between its ends, a geom is as wide as it is deep.
         (Some((_, half)), _) => [size[0], size[0], *half],
@@ -324,13 +326,4 @@ fn primitive(
         },
     };
     Some((geometry, between.map(|(pose, _)| pose)))
-}
-
-/// The pose of a geom between two points, and half of their distance.
-fn between([ax, ay, az, bx, by, bz]: [f64; 6]) -> (Isometry3<f64>, f64) {
-    let (a, b) = (Point3::new(ax, ay, az), Point3::new(bx, by, bz));
-    let turned = UnitQuaternion::rotation_between(&Vector3::z(), &(b - a))
-        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI));
-    let middle = Translation3::from(nalgebra::center(&a, &b).coords);
-    (Isometry3::from_parts(middle, turned), (b - a).norm() / 2.0)
 }

@@ -89,12 +89,22 @@ pub(super) fn couplings(
     }
     let follows = |hinge: &usize| known.mimics.contains_key(&tree.hinges[*hinge].name);
     let is_passive = |hinge: &usize| !follows(hinge) && known.is_passive(&tree.hinges[*hinge].name);
-    let closures =
-        elements(root, "equality").filter_map(|node| tree.closure(node, compiler, reader));
-    let closures: Vec<Closure<'_>> = closures
-        .filter(|closure| !closure.hinges.is_empty())
-        .take(MOST_LOOPS)
-        .collect();
+    let loops = elements(root, "equality")
+        .filter(|node| node.has_tag_name("connect") && node.attribute("active") != Some("false"));
+    let mut closures = Vec::new();
+    for node in loops.take(MOST_LOOPS) {
+        match tree.closure(node, compiler, reader) {
+            Some(closure) if closure.hinges.is_empty() => {}
+            Some(closure) => closures.push(closure),
+            None => {
+                let message =
+                    "this loop of links is left open: it names no body or site of this file";
+                let help = "its links then stay where the file puts them; bodies of attached models \
+                            can't be connected here";
+                reader.warning("W036", node, message.to_owned(), help);
+            }
+        }
+    }
     for group in together(closures, is_passive) {
         let hinges: BTreeSet<usize> = group
             .iter()
@@ -268,7 +278,7 @@ impl BodyTree {
             .collect();
         for item in items.iter().filter(|item| item.is("site")) {
             let attributes = compiler.attributes(item.node, item.class);
-            let at = item.shift * compiler.pose(&attributes, item.node, walk.reader);
+            let at = item.shift * compiler.site(&attributes, item.node, walk.reader);
             if let Some(name) = item.name() {
                 self.sites.insert(name, (body, at * Point3::origin()));
             }
@@ -284,7 +294,7 @@ impl BodyTree {
             self.names.insert(name, body);
         }
         for item in items.iter().filter(|item| item.is("body")) {
-            if !walk.budget.body(item.node, walk.reader) {
+            if !walk.budget.enter(item.node, walk.reader) {
                 return;
             }
             let attributes = compiler.attributes(item.node, item.class);
@@ -297,20 +307,17 @@ impl BodyTree {
             let inside = (item.node, Some(self.bodies.len() - 1), item.suffix.as_str());
             let class = item.node.attribute("childclass").or(item.class);
             self.add(inside, class, walk);
+            walk.budget.leave();
         }
     }
 
-    /// The points that a `<connect>` puts together. Returns `None` for other elements and those
-    /// that name no known body.
+    /// The points that a `<connect>` puts together. Returns `None` if it names no known body.
     fn closure<'a>(
         &self,
         node: Node<'a>,
         compiler: &Compiler,
         reader: &mut Reader,
     ) -> Option<Closure<'a>> {
-        if !node.has_tag_name("connect") || node.attribute("active") == Some("false") {
-            return None;
-        }
         let attributes = compiler.attributes(node, None);
         let body = |name: &str| {
             if name == "world" {
@@ -402,9 +409,7 @@ fn hinge(
         numbers("axis").unwrap_or([0.0, 0.0, 1.0]),
         numbers("pos").unwrap_or([0.0; 3]),
     );
-    let range = attributes
-        .get("range")
-        .and_then(|text| reader.numbers::<2>(joint, text, Bound::Finite));
+    let range = compiler.limits(joint, &attributes, ["range", "limited"], reader);
     let number = |name: &str| {
         attributes
             .get(name)
@@ -417,9 +422,7 @@ fn hinge(
         axis: Unit::try_new(item.shift.rotation * Vector3::from(axis), 1e-9)?,
         at: (item.shift * Point3::from(at)).coords,
         slides,
-        range: range
-            .filter(|_| attributes.get("limited") != Some("false"))
-            .map(|ends| ends.map(|end| end * unit)),
+        range: range.map(|ends| ends.map(|end| end * unit)),
         start: number("ref") * unit,
         stiffness: number("stiffness").max(0.0),
         rest: number("springref") * unit,

@@ -24,9 +24,12 @@ pub(crate) mod mjcf;
 mod mjcf_budget;
 mod mjcf_compiler;
 mod mjcf_couplings;
+mod mjcf_elements;
 mod mjcf_geoms;
 mod mjcf_loops;
 mod mjcf_masks;
+#[cfg(test)]
+mod mjcf_tests;
 mod mjcf_world;
 mod nested;
 pub(crate) mod robot;

@@ -386,6 +386,24 @@ impl<'a> Reader<'a> {
         None
     }
 
+    /// Parses the numbers of an attribute, of which there may be any number; reports W034 and returns
+    /// `None` if one of them is no finite number.
+    pub(crate) fn list(&mut self, node: Node, name: &str, text: &str) -> Option<Vec<f64>> {
+        let words = text.split_whitespace();
+        let numbers: Option<Vec<f64>> = words
+            .map(|word| word.parse().ok().filter(|number: &f64| number.is_finite()))
+            .collect();
+        if numbers.is_none() {
+            let message = format!(
+                "`{name}` must contain numbers, but this is `{}`",
+                short(text)
+            );
+            let help = "separate numbers by spaces, and write them like 0.25";
+            self.error("W034", node, message, help);
+        }
+        numbers
+    }
+
     /// Parses one number from an element's text; reports W034 and returns `None` if it is invalid.
     pub(crate) fn number(&mut self, node: Node, bound: Bound) -> Option<f64> {
         self.numbers::<1>(node, text(node), bound)
