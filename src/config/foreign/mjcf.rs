@@ -41,7 +41,7 @@ pub(crate) type MjcfRead = (ModelTree, Source, Diagnostics);
 /// Reads a robot.
 ///
 /// # Errors
-/// Faults of the text: W031 to W036, W051, W055.
+/// Faults of the text: W031 to W037, W051, W055.
 pub(crate) fn robot(
     source: &Source,
     path: &Path,
@@ -232,6 +232,10 @@ impl Model<'_> {
         unique(&mut self.names, name)
     }
 
+    pub(super) fn is_robot(&self) -> bool {
+        self.purpose == Purpose::Robot
+    }
+
     /// Another one of the same file, without bodies.
     pub(super) fn alone(&self) -> Self {
         Self {
@@ -273,11 +277,12 @@ impl Model<'_> {
 
     /// Adds what depends on all bodies: the contacts between them, and the couplings of joints.
     fn finish(&mut self, root: Node, reader: &mut Reader) {
-        if self.purpose == Purpose::Robot {
-            self.contacts.read(root);
+        let is_known = |body: &str| self.names.contains_key(body);
+        if self.is_robot() {
+            self.contacts.read(root, is_known, reader);
         }
-        if self.purpose == Purpose::Robot && self.file.depth == 0 {
-            let passing = self.contacts.passing(|body| self.names.contains_key(body));
+        if self.is_robot() && self.file.depth == 0 {
+            let passing = self.contacts.passing(is_known);
             self.tree.passing.extend(passing);
         }
         let couplings = Rc::clone(&self.couplings);
@@ -334,6 +339,9 @@ impl Model<'_> {
             link.solids.extend(solids);
             link.visuals.extend(visuals);
         }
+        let named = content.iter().filter(|geom| geom.is("geom"));
+        let named = named.filter_map(|geom| Some((geom.name()?, world.to_owned())));
+        self.contacts.bodies.extend(named);
         self.children(&content, world, &Isometry3::identity(), reader);
     }
 

@@ -46,6 +46,16 @@ const ACTUATORS: [&str; 9] = [
     "adhesion",
 ];
 
+/// The words of attributes of `<compiler>`.
+const KEYWORDS: [(&str, &[&str]); 7] = [
+    ("angle", &["radian", "degree"]),
+    ("coordinate", &["local", "global"]),
+    ("autolimits", &["true", "false"]),
+    ("balanceinertia", &["true", "false"]),
+    ("strippath", &["true", "false"]),
+    ("fitaabb", &["true", "false"]),
+    ("inertiafromgeom", &["true", "false", "auto"]),
+];
 /// Attributes of rotations other than `quat`.
 const TURNS: [&str; 4] = ["axisangle", "euler", "xyaxes", "zaxis"];
 /// Shapes that may be stated by their ends.
@@ -247,6 +257,14 @@ impl Compiler {
     }
 
     fn read_settings(&mut self, settings: Node, folders: &mut Folders, reader: &mut Reader) {
+        for (key, words) in KEYWORDS {
+            let Some(word) = settings.attribute(key).filter(|word| !words.contains(word)) else {
+                continue;
+            };
+            let message = format!("`{key}` can't be `{word}`");
+            let help = format!("write one of these words: {}", words.join(", "));
+            reader.error("W034", settings, message, help);
+        }
         match settings.attribute("angle") {
             Some("radian") => self.angle = 1.0,
             Some("degree") => self.angle = 1f64.to_radians(),

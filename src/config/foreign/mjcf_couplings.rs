@@ -298,13 +298,9 @@ fn servo_range(
     compiler: &Compiler,
     reader: &mut Reader,
 ) -> Option<[f64; 2]> {
-    let first = |name: &str, place: usize| {
-        attributes
-            .get(name)?
-            .split_whitespace()
-            .nth(place)?
-            .parse::<f64>()
-            .ok()
+    let mut first = |name: &str, place: usize| {
+        let numbers = reader.list(actuator, name, attributes.get(name)?)?;
+        numbers.get(place).copied()
     };
     let ratio = match actuator.tag_name().name() {
         "position" => 1.0,
@@ -313,8 +309,9 @@ fn servo_range(
         }
         _ => return None,
     };
+    let gear = first("gear", 0).unwrap_or(1.0);
     let ends = compiler.limits(actuator, attributes, ["ctrlrange", "ctrllimited"], reader)?;
-    let [a, b] = ends.map(|end| end * ratio / first("gear", 0).unwrap_or(1.0));
+    let [a, b] = ends.map(|end| end * ratio / gear);
     // A negative gear turns the range.
     let range = [a.min(b), a.max(b)];
     (range[0] < range[1] && range.iter().all(|end| end.is_finite())).then_some(range)

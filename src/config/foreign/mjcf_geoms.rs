@@ -63,6 +63,12 @@ impl<'a> Model<'a> {
         let shift = own * item.shift;
         let pose = shift * self.compiler.pose(attributes, geom, reader);
         let (geometry, moved) = match kind {
+            "hfield" | "sdf" if is_solid && (kind == "sdf" || !self.is_robot()) => {
+                let message = format!("a geom of the type {kind} can't be simulated");
+                let help = "replace it by a mesh, or by boxes";
+                reader.error("W035", geom, message, help);
+                return None;
+            }
             "plane" | "hfield" | "sdf" => {
                 if is_solid {
                     let message = format!("the geom of the type {kind} is left out");
@@ -211,7 +217,11 @@ impl<'a> Model<'a> {
                 match Mesh::new(asset.vertices.clone(), triangles) {
                     Ok(mesh) => mesh,
                     Err(fault) => {
-                        let help = "give it at least four vertices that are not in one plane";
+                        let help = if asset.triangles.is_empty() {
+                            "give it at least four vertices that are not in one plane"
+                        } else {
+                            "each number in `face` is the place of a vertex, from 0 on"
+                        };
                         reader.error("W037", geom, fault.to_string(), help);
                         return None;
                     }

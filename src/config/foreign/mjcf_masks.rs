@@ -70,22 +70,48 @@ pub(super) struct Contacts {
 }
 
 impl Contacts {
-    /// Adds what the sections `<contact>` of a file say about bodies that are known.
-    pub(super) fn read(&mut self, root: Node) {
-        let pair = |[one, other]: [&str; 2]| [one.min(other).to_owned(), one.max(other).to_owned()];
+    /// Adds what the sections `<contact>` of a file say about bodies that are known, and warns of
+    /// others (W036).
+    pub(super) fn read(
+        &mut self,
+        root: Node,
+        is_known: impl Fn(&str) -> bool,
+        reader: &mut Reader,
+    ) {
         for contact in elements(root, "contact") {
-            let ends =
-                |keys: [&str; 2]| Some([contact.attribute(keys[0])?, contact.attribute(keys[1])?]);
-            match contact.tag_name().name() {
-                "exclude" => self.excluded.extend(ends(["body1", "body2"]).map(pair)),
-                "pair" => {
-                    let bodies = ends(["geom1", "geom2"])
-                        .map(|geoms| geoms.map(|geom| self.bodies.get(geom).map(String::as_str)));
-                    if let Some([Some(one), Some(other)]) = bodies {
-                        self.paired.insert(pair([one, other]));
-                    }
+            let keys = match contact.tag_name().name() {
+                "exclude" => ["body1", "body2"],
+                "pair" => ["geom1", "geom2"],
+                _ => continue,
+            };
+            let [Some(one), Some(other)] = keys.map(|key| contact.attribute(key)) else {
+                continue;
+            };
+            let is_pair = keys[0] == "geom1";
+            let body = |name: &str| {
+                if is_pair {
+                    return self.bodies.get(name).cloned();
                 }
-                _ => {}
+                is_known(name).then(|| name.to_owned())
+            };
+            let unknown = [one, other].into_iter().find(|name| body(name).is_none());
+            let (Some(one), Some(other)) = (body(one), body(other)) else {
+                let name = unknown.unwrap_or_default();
+                let what = if is_pair { "geom" } else { "body" };
+                let message = format!("this contact is left out: there is no {what} `{name}`");
+                let help = "copies have their number at the end of their name";
+                reader.warning("W036", contact, message, help);
+                continue;
+            };
+            let pair = if one <= other {
+                [one, other]
+            } else {
+                [other, one]
+            };
+            if is_pair {
+                self.paired.insert(pair);
+            } else {
+                self.excluded.insert(pair);
             }
         }
     }

@@ -314,6 +314,44 @@ fn meshes_are_named_from_the_right_folder() {
     assert_eq!(files, ["sub/meshes/t.stl", "/far/t.stl"]);
 }
 
+/// A hull of many points is found once, however many geoms have it.
+#[test]
+fn large_meshes_are_read_once() {
+    let start = std::time::Instant::now();
+    let n = 30_000;
+    let points: Vec<String> = (0..n)
+        .map(|idx| {
+            let z = 1.0 - 2.0 * (f64::from(idx) + 0.5) / f64::from(n);
+            let (across, angle) = ((1.0 - z * z).sqrt(), 2.399_963 * f64::from(idx));
+            format!(
+                "{:.6} {:.6} {z:.6}",
+                across * angle.cos(),
+                across * angle.sin()
+            )
+        })
+        .collect();
+    let asset = format!(
+        "<asset><mesh name=\"m\" inertia=\"convex\" vertex=\"{}\"/></asset>",
+        points.join(" ")
+    );
+    let bodies = "<body name=\"b\"><joint/><replicate count=\"100\"><geom type=\"mesh\" mesh=\"m\"/></replicate></body>";
+    let (tree, _) = text(bodies, &asset).expect("it is valid");
+    let kg = tree
+        .link("b")
+        .and_then(|link| link.inertial.as_ref())
+        .map(|stated| stated.kg);
+    let ball = 4.0 / 3.0 * std::f64::consts::PI * 1000.0;
+    assert!(
+        kg.is_some_and(|kg| (kg / (100.0 * ball) - 1.0).abs() < 1e-3),
+        "{kg:?}"
+    );
+    assert!(
+        start.elapsed().as_secs_f64() < 20.0,
+        "{:?}",
+        start.elapsed()
+    );
+}
+
 /// Attached bodies are pieces of a world, what is soft is refused, and a body that moves freely is
 /// found whatever says so.
 #[test]
@@ -383,6 +421,27 @@ fn what_is_not_simulated_is_said() {
             "`<weld>` to a body",
         ),
         (&part("stiffness=\"2\"", ""), "", "W036"),
+        (
+            "<body name=\"a\"><geom type=\"sdf\" mesh=\"m\"/></body>",
+            "",
+            "W035",
+        ),
+        (
+            "",
+            "<contact><exclude body1=\"x\" body2=\"y\"/></contact>",
+            "no body `x`",
+        ),
+        (
+            "",
+            "<contact><pair geom1=\"x\" geom2=\"y\"/></contact>",
+            "no geom `x`",
+        ),
+        ("", "<compiler angle=\"grad\"/>", "W034"),
+        (
+            &part("", ""),
+            "<actuator><motor joint=\"j\" gear=\"x\" ctrlrange=\"-1 1\"/></actuator>",
+            "W034",
+        ),
         (&part("type=\"hunge\"", ""), "", "W035"),
         (
             &part("", ""),
@@ -398,6 +457,7 @@ fn what_is_not_simulated_is_said() {
         assert!(said.contains(code), "{bodies} {more}: {said}");
     }
     for (bodies, more) in [
+        ("<geom type=\"hfield\"/>".to_owned(), ""),
         (part("stiffness=\"2\"", ""), ""),
         (
             part("", ""),

@@ -25,7 +25,7 @@ pub(crate) struct Piece {
 /// included files, and warnings.
 ///
 /// # Errors
-/// Faults of the text: W031 to W036, W051, W055.
+/// Faults of the text: W031 to W037, W051, W055.
 pub(crate) fn read(
     source: &Source,
     path: &Path,
