@@ -35,7 +35,7 @@ const SLIDES_M: f64 = 10.0;
 /// Deepest attachment of models to others: deeper ones attach themselves.
 const DEEPEST: usize = 8;
 
-/// A tree, its text with all included files, and warnings.
+/// A tree, its text with those of all included files and attached models, and warnings.
 pub(crate) type MjcfRead = (ModelTree, Source, Diagnostics);
 
 /// Reads a robot.
@@ -119,7 +119,7 @@ fn whole(
 }
 
 /// Reads the settings of a text, and calls `read` with its root and a model without bodies. Returns
-/// its result, the text with all included files, and warnings.
+/// its result, the text with those of all included files and attached models, and warnings.
 pub(super) fn with_model<T>(
     source: &Source,
     file: File<'_>,
@@ -134,7 +134,9 @@ pub(super) fn with_model<T>(
     reader.pieces = pieces;
     mjcf_elements::check(root, purpose, &mut reader);
     let compiler = Compiler::read(root, &mut reader);
+    let attached = Rc::new(RefCell::new(String::new()));
     let model = Model {
+        attached: Rc::clone(&attached),
         tree: ModelTree::default(),
         couplings: Rc::new(Couplings::read(root, &compiler, &mut reader)),
         bodies: Rc::new(names_of_bodies(root)),
@@ -155,7 +157,17 @@ pub(super) fn with_model<T>(
     if said.has_errors() {
         return Err(said);
     }
-    Ok((read, source, said))
+    // Whoever compares two models by their texts compares all of both.
+    let attached = attached.take();
+    let text = if attached.is_empty() {
+        source
+    } else {
+        Source::new(
+            source.name.to_string(),
+            format!("{}{attached}", source.text),
+        )
+    };
+    Ok((read, text, said))
 }
 
 /// A name that no other has.
@@ -220,6 +232,8 @@ pub(super) struct Model<'a> {
     copies: BTreeMap<String, (String, String)>,
     /// Starts of the joints of attached models.
     starts: BTreeMap<String, f64>,
+    /// The texts of attached models.
+    attached: Rc<RefCell<String>>,
     /// Meshes of the file that differ from those of their own files; `None` for those with a fault.
     pub(super) meshes: Rc<RefCell<BTreeMap<String, Option<Rc<Mesh>>>>>,
     purpose: Purpose,
@@ -250,6 +264,7 @@ impl Model<'_> {
             has_springs: false,
             copies: BTreeMap::new(),
             starts: BTreeMap::new(),
+            attached: Rc::clone(&self.attached),
             meshes: Rc::clone(&self.meshes),
             ..*self
         }
@@ -415,8 +430,9 @@ impl Model<'_> {
         };
         let read = whole(&source, attached, self.purpose);
         let built = match read {
-            Ok((built, _, said)) => {
+            Ok((built, text, said)) => {
                 reader.found.extend(said);
+                self.attached.borrow_mut().push_str(&text.text);
                 built
             }
             Err(faults) => return reader.found.extend(faults),
@@ -1001,6 +1017,7 @@ fn lens() -> Isometry3<f64> {
 mod tests {
     use super::*;
     use actcheck_base::Files;
+    use std::f64::consts::FRAC_PI_6;
 
     fn read(bodies: &str, more: &str) -> Result<ModelTree, Diagnostics> {
         let text = format!(
@@ -1231,15 +1248,15 @@ mod tests {
             )
         };
         for (of_arm, of_hand, masses) in [
-            ("", "", [0.523_599, 0.0, 0.004_189]),
+            ("", "", [FRAC_PI_6, 0.0, 0.004_189]),
             (
                 "",
                 "boundmass=\"3\" boundinertia=\"0.3\"",
-                [0.523_599, 0.0, 3.0],
+                [FRAC_PI_6, 0.0, 3.0],
             ),
             ("boundmass=\"7\"", "boundmass=\"3\"", [7.0, 7.0, 3.0]),
             ("boundmass=\"7\"", "", [7.0, 7.0, 0.004_189]),
-            ("", "settotalmass=\"5\"", [0.523_599, 0.0, 0.004_189]),
+            ("", "settotalmass=\"5\"", [FRAC_PI_6, 0.0, 0.004_189]),
             (
                 "settotalmass=\"9\"",
                 "settotalmass=\"5\"",

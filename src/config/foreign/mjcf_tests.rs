@@ -123,7 +123,7 @@ fn sites_between_two_points_are_there() {
     assert!((at.translation.vector - Vector3::new(0.5, 0.0, 0.0)).norm() < 1e-9);
     assert!((at.rotation * Vector3::z() + Vector3::x()).norm() < 1e-9);
     let found = tree.links[0].solids[0].pose.rotation;
-    let expected = Quaternion::new(0.70711, 0.20319, -0.67729, 0.0);
+    let expected = Quaternion::new(std::f64::consts::FRAC_1_SQRT_2, 0.20319, -0.67729, 0.0);
     assert!(found.angle_to(&UnitQuaternion::from_quaternion(expected)) < 1e-4);
     let said = text("<site name=\"s\" fromto=\"0 0 0 1 0 0\"/>", "").expect_err("it is a ball");
     assert!(said.contains("W034"), "{said}");
@@ -275,6 +275,23 @@ fn attached_joints_are_driven_from_outside() {
     let open = "<equality><connect body1=\"a\" body2=\"p_h\" anchor=\"0 0 0\"/></equality>";
     let (_, said) = read(open).expect("it is valid");
     assert!(said.to_string().contains("left open"), "{said}");
+}
+
+/// Two models with different attached models are different, even in their texts.
+#[test]
+fn the_text_of_a_model_has_that_of_attached_ones() {
+    let outer = "<mujoco><asset><model name=\"h\" file=\"h.xml\"/></asset><worldbody>\
+                 <attach model=\"h\" prefix=\"p_\"/></worldbody></mujoco>";
+    let read = |size: &str| {
+        let inner = file(&format!("<body><geom size=\"{size}\"/></body>"), "");
+        with_first(
+            &[("a.xml", outer), ("h.xml", &inner)],
+            |source, path, lookup| {
+                mjcf::robot(source, path, lookup).map(|(_, text, _)| text.text.to_string())
+            },
+        )
+    };
+    assert!(read("0.123").is_ok_and(|text| text.contains("0.123")));
 }
 
 /// An actuator and an equality of a joint count for all its copies.
