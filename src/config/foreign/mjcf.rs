@@ -574,7 +574,7 @@ impl Model<'_> {
             let attributes = compiler.attributes(joint.node, joint.class);
             let anchor = attributes
                 .get("pos")
-                .and_then(|text| reader.numbers::<3>(joint.node, text, Bound::Finite));
+                .and_then(|text| reader.numbers::<3>(joint.node, text, Bound::Within));
             let anchor = joint.shift * nalgebra::Point3::from(anchor.unwrap_or([0.0; 3]));
             let anchor = Translation3::from(anchor.coords);
             let link = if idx + 1 == joints.len() {
@@ -981,13 +981,13 @@ fn inertial(
     let [kg] = reader.numbers::<1>(node, written, Bound::Mass)?;
     let about_com = match (attributes.get("fullinertia"), attributes.get("diaginertia")) {
         (Some(text), _) => {
-            let [xx, yy, zz, xy, xz, yz] = reader.numbers(node, text, Bound::Finite)?;
+            let [xx, yy, zz, xy, xz, yz] = reader.numbers(node, text, Bound::Within)?;
             Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
         }
         (None, Some(text)) => Matrix3::from_diagonal(&Vector3::from(reader.numbers::<3>(
             node,
             text,
-            Bound::Finite,
+            Bound::Within,
         )?)),
         (None, None) if kg > 0.0 => {
             let message = "`<inertial>` has neither `diaginertia` nor `fullinertia`".to_owned();

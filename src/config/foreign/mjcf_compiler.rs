@@ -314,9 +314,9 @@ impl Compiler {
                 .numbers::<1>(settings, written, bound)
                 .map(|[number]| number)
         };
-        masses.least[0] = number("boundmass", Bound::NotNegative).unwrap_or(masses.least[0]);
-        masses.least[1] = number("boundinertia", Bound::NotNegative).unwrap_or(masses.least[1]);
-        let total = number("settotalmass", Bound::Finite);
+        masses.least[0] = number("boundmass", Bound::Mass).unwrap_or(masses.least[0]);
+        masses.least[1] = number("boundinertia", Bound::Mass).unwrap_or(masses.least[1]);
+        let total = number("settotalmass", Bound::Within);
         masses.total_kg = total.filter(|kg| *kg > 0.0).or(masses.total_kg);
         if let Some(written) = settings.attribute("inertiagrouprange") {
             let groups = reader.numbers(settings, written, Bound::Finite);
@@ -332,9 +332,9 @@ impl Compiler {
             return;
         };
         let numbers = |key: &str| attributes.get(key);
-        let scale = numbers("scale").and_then(|text| reader.numbers(node, text, Bound::Finite));
+        let scale = numbers("scale").and_then(|text| reader.numbers(node, text, Bound::Within));
         let position =
-            numbers("refpos").and_then(|text| reader.numbers::<3>(node, text, Bound::Finite));
+            numbers("refpos").and_then(|text| reader.numbers::<3>(node, text, Bound::Within));
         let turn = numbers("refquat").and_then(|text| quaternion(node, text, reader));
         let mut mesh = MeshAsset {
             scale: scale.unwrap_or([1.0; 3]),
@@ -533,7 +533,7 @@ impl Compiler {
             return None;
         };
         let mut three = |key: &str| match node.attribute(key) {
-            Some(text) => reader.numbers::<3>(node, text, Bound::Finite),
+            Some(text) => reader.numbers::<3>(node, text, Bound::Within),
             None => Some([0.0; 3]),
         };
         let (offset, euler) = (three("offset")?, three("euler")?);
@@ -601,7 +601,7 @@ impl Compiler {
     ) -> Isometry3<f64> {
         let at = attributes
             .get("pos")
-            .and_then(|text| reader.numbers::<3>(node, text, Bound::Finite));
+            .and_then(|text| reader.numbers::<3>(node, text, Bound::Within));
         let at = Translation3::from(Vector3::from(at.unwrap_or([0.0; 3])));
         Isometry3::from_parts(
             at,
@@ -667,7 +667,7 @@ impl Compiler {
             reader.error("W034", node, message, "state the `type` of the shape");
             return None;
         }
-        let [ax, ay, az, bx, by, bz] = reader.numbers(node, text, Bound::Finite)?;
+        let [ax, ay, az, bx, by, bz] = reader.numbers(node, text, Bound::Within)?;
         let (a, b) = (Point3::new(ax, ay, az), Point3::new(bx, by, bz));
         let middle = Translation3::from(nalgebra::center(&a, &b).coords);
         let turned = upright_to(&(a - b));

@@ -233,7 +233,15 @@ impl<'a> Model<'a> {
         let moved = |vertex: &[f64; 3]| (inverse * Point3::from(*vertex)).coords.into();
         let vertices = mesh.vertices.iter().map(moved).collect();
         let moved = Mesh::new(vertices, mesh.triangles).ok()?;
-        Some(moved.scaled(asset.scale))
+        let scaled = moved.scaled(asset.scale);
+        let is_near = |along: &f64| along.abs() <= LONGEST;
+        if !scaled.vertices.iter().flatten().all(is_near) {
+            let message = format!("the mesh reaches beyond {LONGEST} m from its origin");
+            let help = "lengths are in metres: write `scale` 0.001 for millimetres";
+            reader.error("W034", geom, message, help);
+            return None;
+        }
+        Some(scaled)
     }
 
     /// Returns a primitive that is fitted to a mesh: the one with the same moments of inertia.

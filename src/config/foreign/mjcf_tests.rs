@@ -331,6 +331,49 @@ fn meshes_are_named_from_the_right_folder() {
     assert_eq!(files, ["sub/meshes/t.stl", "/far/t.stl"]);
 }
 
+/// Numbers whose products are no numbers any more end in a fault, or in a model.
+#[test]
+fn huge_numbers_end() {
+    let mesh = |vertex: &str| {
+        format!(
+            "<asset><mesh name=\"m\" vertex=\"{vertex}\"/></asset><compiler boundmass=\"1\" boundinertia=\"1\"/>"
+        )
+    };
+    let bodies = "<body name=\"b\"><joint/><geom type=\"mesh\" mesh=\"m\"/><geom type=\"box\" mesh=\"m\"/></body>";
+    for vertex in [
+        "0 0 0 1e200 0 0 0 1e200 0 0 0 1e200",
+        "0 0 0 1e308 0 0 0 1e308 0 0 0 -1e308",
+        "0 0 0 1e-200 0 0 0 1e-200 0 0 0 1e-200",
+        "0 0 0 nan 0 0 0 1 0 0 0 inf",
+    ] {
+        let said = text(bodies, &mesh(vertex));
+        assert!(said.is_err() || vertex.contains("1e-200"), "{vertex}");
+    }
+    for moments in ["1e308", "1e200", "-1e308"] {
+        let body = format!(
+            "<body><joint/><inertial pos=\"0 0 0\" mass=\"1\" fullinertia=\"{}\"/></body>",
+            [moments; 6].join(" ")
+        );
+        let _ = text(
+            &body,
+            "<compiler boundmass=\"1\" boundinertia=\"1\" balanceinertia=\"true\"/>",
+        );
+    }
+}
+
+/// An attached model has the angles of its own file.
+#[test]
+fn attached_angles_are_those_of_their_file() {
+    let outer = "<mujoco><compiler angle=\"degree\" eulerseq=\"xyz\"/><asset><model name=\"h\" file=\"h.xml\"/></asset>\
+                 <worldbody><attach model=\"h\" prefix=\"p_\"/></worldbody></mujoco>";
+    let inner = "<mujoco><compiler angle=\"radian\" eulerseq=\"zyx\"/><worldbody><body name=\"h\">\
+                 <site name=\"s\" euler=\"0.3 0.5 0.7\"/></body></worldbody></mujoco>";
+    let (tree, _) = robot(&[("a.xml", outer), ("h.xml", inner)]).expect("it is valid");
+    let found = joint(&tree, "p_s_fixed").origin.rotation;
+    let expected = Quaternion::new(0.91263, 0.29378, 0.27944, 0.05213);
+    assert!(found.angle_to(&UnitQuaternion::from_quaternion(expected)) < 1e-4);
+}
+
 /// A hull of many points is found once, however many geoms have it.
 #[test]
 fn large_meshes_are_read_once() {

@@ -29,6 +29,8 @@ pub(crate) enum Bound {
     Positive,
     /// A length of a body: as [`Bound::Positive`], but see [`LONGEST`].
     Length,
+    /// A position, or a moment of inertia: either sign, and as [`Bound::Positive`].
+    Within,
     /// A mass that may be missing: 0 or as [`Bound::Positive`].
     Mass,
 }
@@ -47,6 +49,7 @@ impl Bound {
                 Self::Finite => true,
                 Self::NotNegative => number >= 0.0,
                 Self::Positive | Self::Length => number > 0.0 && number <= LARGEST,
+                Self::Within => number.abs() <= LARGEST,
                 Self::Mass => (0.0..=LARGEST).contains(&number),
             }
     }
@@ -56,6 +59,7 @@ impl Bound {
             Self::Finite => "finite",
             Self::NotNegative => "at least 0",
             Self::Positive | Self::Length => "above 0 and at most 1000000",
+            Self::Within => "between -1000000 and 1000000",
             Self::Mass => "at least 0 and at most 1000000",
         }
     }
