@@ -54,6 +54,6 @@ pub use trace::{
     PerceivedPlane, PerceivedThing, Percept, Phase, Trace,
 };
 pub use tree::{
-    Matter, ModelTree, TreeGeometry, TreeInertial, TreeJoint, TreeLink, TreeMimic, TreeMotion,
-    TreeSolid,
+    Amount, Matter, ModelTree, Spread, TreeGeometry, TreeInertial, TreeJoint, TreeLink, TreeMimic,
+    TreeMotion, TreeSolid,
 };

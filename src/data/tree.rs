@@ -70,15 +70,34 @@ pub struct TreeSolid {
 
 /// The basis of a mass.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Matter {
+pub struct Matter {
+    /// How much of it there is.
+    pub amount: Amount,
+    /// Where it is.
+    pub spread: Spread,
+}
+
+/// The amount of a mass.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Amount {
     /// Unit: kilograms.
     Mass(f64),
-    /// Unit: kg/m³.
+    /// Unit: kg/m³, or kg/m² of a surface.
     Density(f64),
-    /// Only the surface has a mass. Unit: kg/m².
-    Shell(f64),
-    /// The mass of a shape of which only the surface has a mass. Unit: kilograms.
-    ShellMass(f64),
+}
+
+/// The parts of a shape that a mass is spread over.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Spread {
+    /// All of it. In a mesh, triangles that are turned inwards count as the others.
+    #[default]
+    Inside,
+    /// As [`Spread::Inside`], but triangles of a mesh that are turned inwards count as hollows.
+    Exact,
+    /// The convex hull of a mesh.
+    Hull,
+    /// Its surface.
+    Shell,
 }
 
 /// Form and size of a shape. Unit: metres.

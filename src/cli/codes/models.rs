@@ -217,7 +217,7 @@ const CODES_W: &[Code] = &[
     code(
         "W055",
         "an XML file of a model exceeds a limit of its structure",
-        "a damaged or malicious file: entities that grow, hundreds of attributes or namespaces, thousands of levels",
+        "a damaged or malicious file: entities that grow, hundreds of attributes or namespaces, thousands of levels, copies of copies",
         "don't use the file, or export the model again",
     ),
     code(

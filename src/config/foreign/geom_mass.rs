@@ -5,7 +5,8 @@ use std::f64::consts::PI;
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use actcheck_data::{Matter, Mesh, Shape, TreeGeometry, TreeSolid};
+use crate::foreign::hull::convex_hull;
+use actcheck_data::{Amount, Matter, Mesh, Shape, Spread, TreeGeometry, TreeSolid};
 
 /// The mass of a body. Frame: that of the shape, or of the link.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,53 +63,71 @@ impl GeomMass {
     }
 }
 
-/// Returns the mass of all shapes that have one, in the frame of their link; a mass of 0 if none
-/// has. `meshes` are the shapes of mesh files, in the files' own scales.
-pub(crate) fn together<'a>(
-    solids: impl IntoIterator<Item = &'a TreeSolid>,
-    meshes: &BTreeMap<String, Vec<Shape>>,
-) -> GeomMass {
-    let masses = solids
-        .into_iter()
-        .filter_map(|solid| Some(of(solid, meshes)?.moved(&solid.pose)));
-    masses.fold(GeomMass::NONE, GeomMass::plus)
+/// The masses of mesh files at a density of 1, each of which is computed once: a hull takes long,
+/// and many shapes may have the same mesh.
+#[derive(Default)]
+pub(crate) struct MeshMasses {
+    /// By file, the bits of the scale, and the spread.
+    known: BTreeMap<(String, [u64; 3], Spread), GeomMass>,
 }
 
-/// Returns the mass of a shape in its own frame; `None` if it has none.
-fn of(solid: &TreeSolid, meshes: &BTreeMap<String, Vec<Shape>>) -> Option<GeomMass> {
-    let matter = solid.matter?;
-    let is_shell = matches!(matter, Matter::Shell(_) | Matter::ShellMass(_));
-    let unit = of_unit(&solid.geometry, is_shell, meshes)?;
-    let (Matter::Mass(amount)
-    | Matter::Density(amount)
-    | Matter::Shell(amount)
-    | Matter::ShellMass(amount)) = matter;
-    let factor = match matter {
-        Matter::Mass(_) | Matter::ShellMass(_) => amount / unit.kg,
-        Matter::Density(_) | Matter::Shell(_) => amount,
-    };
-    (factor.is_finite() && factor > 0.0).then(|| unit.times(factor))
+impl MeshMasses {
+    /// Returns the mass of all shapes that have one, in the frame of their link; a mass of 0 if none
+    /// has. `meshes` are the shapes of mesh files, in the files' own scales.
+    pub(crate) fn together<'a>(
+        &mut self,
+        solids: impl IntoIterator<Item = &'a TreeSolid>,
+        meshes: &BTreeMap<String, Vec<Shape>>,
+    ) -> GeomMass {
+        let masses = solids
+            .into_iter()
+            .filter_map(|solid| Some(self.of(solid, meshes)?.moved(&solid.pose)));
+        masses.fold(GeomMass::NONE, GeomMass::plus)
+    }
+
+    /// Returns the mass of a shape in its own frame; `None` if it has none.
+    fn of(&mut self, solid: &TreeSolid, meshes: &BTreeMap<String, Vec<Shape>>) -> Option<GeomMass> {
+        let Matter { amount, spread } = solid.matter?;
+        let unit = self.of_unit(&solid.geometry, spread, meshes)?;
+        let factor = match amount {
+            Amount::Mass(kg) => kg / unit.kg,
+            Amount::Density(density) => density,
+        };
+        (factor.is_finite() && factor > 0.0).then(|| unit.times(factor))
+    }
+
+    /// Returns the mass of a shape with a density of 1, or of its surface with 1 kg/m².
+    pub(crate) fn of_unit(
+        &mut self,
+        geometry: &TreeGeometry,
+        spread: Spread,
+        meshes: &BTreeMap<String, Vec<Shape>>,
+    ) -> Option<GeomMass> {
+        let TreeGeometry::Mesh { file, scale } = geometry else {
+            return Some(of_primitive(geometry, spread == Spread::Shell));
+        };
+        let key = (file.clone(), scale.map(f64::to_bits), spread);
+        if let Some(known) = self.known.get(&key) {
+            return Some(*known);
+        }
+        let parts = meshes.get(file)?.iter().filter_map(|shape| match shape {
+            Shape::Mesh { mesh } => Some(of_mesh(&mesh.scaled(*scale), spread)),
+            _ => None,
+        });
+        let mass = parts.fold(GeomMass::NONE, GeomMass::plus);
+        self.known.insert(key, mass);
+        Some(mass)
+    }
 }
 
-/// Returns the mass of a shape with a density of 1, or of its surface with 1 kg/m².
-fn of_unit(
-    geometry: &TreeGeometry,
-    is_shell: bool,
-    meshes: &BTreeMap<String, Vec<Shape>>,
-) -> Option<GeomMass> {
+fn of_primitive(geometry: &TreeGeometry, is_shell: bool) -> GeomMass {
     let centred = |kg: f64, moments: [f64; 3]| GeomMass {
         kg,
         com: Vector3::zeros(),
         about_com: Matrix3::from_diagonal(&Vector3::from(moments)),
     };
-    Some(match geometry {
-        TreeGeometry::Mesh { file, scale } => {
-            let parts = meshes.get(file)?.iter().filter_map(|shape| match shape {
-                Shape::Mesh { mesh } => Some(of_mesh(&mesh.scaled(*scale), is_shell)),
-                _ => None,
-            });
-            parts.fold(GeomMass::NONE, GeomMass::plus)
-        }
+    match geometry {
+        TreeGeometry::Mesh { .. } => GeomMass::NONE,
         TreeGeometry::Box { size } if is_shell => hollow_box(*size),
         TreeGeometry::Box { size: [x, y, z] } => {
             let (kg, [xx, yy, zz]) = (x * y * z, [x * x, y * y, z * z]);
@@ -139,7 +158,7 @@ fn of_unit(
             centred(kg, [across, across, kg * r * r / 2.0])
         }
         TreeGeometry::Capsule { radius, length } => capsule(*radius, *length, is_shell),
-    })
+    }
 }
 
 /// A cylinder between two halves of a ball; a shell has no lids between them.
@@ -208,9 +227,9 @@ struct Sums {
 }
 
 impl Sums {
-    /// A pyramid counts positive however its triangle is turned, so that a mesh with some turned
-    /// triangles has a mass too.
-    fn from(point: Vector3<f64>, mesh: &Mesh, is_shell: bool) -> Self {
+    /// Unless it is exact, a pyramid counts positive however its triangle is turned, so that a mesh
+    /// with some turned triangles has a mass too.
+    fn from(point: Vector3<f64>, mesh: &Mesh, spread: Spread) -> Self {
         let mut sums = Self {
             amount: 0.0,
             first: Vector3::zeros(),
@@ -224,10 +243,11 @@ impl Sums {
             let sum = a + b + c;
             let squares = a * a.transpose() + b * b.transpose() + c * c.transpose();
             // A pyramid has four corners, one of them at the point; a triangle has three.
-            let (own, corners) = if is_shell {
-                ((b - a).cross(&(c - a)).norm() / 2.0, 3.0)
-            } else {
-                ((a.dot(&b.cross(&c)) / 6.0).abs(), 4.0)
+            let volume = a.dot(&b.cross(&c)) / 6.0;
+            let (own, corners) = match spread {
+                Spread::Shell => ((b - a).cross(&(c - a)).norm() / 2.0, 3.0),
+                Spread::Exact => (volume, 4.0),
+                Spread::Inside | Spread::Hull => (volume.abs(), 4.0),
             };
             sums.amount += own;
             sums.first += sum * (own / corners);
@@ -241,22 +261,27 @@ impl Sums {
 /// A mesh by MuJoCo's usual rule: the centre of mass follows from the pyramids to the middle of its
 /// surface, and volume and moments from those to the centre of mass. For a closed mesh, both are
 /// exact.
-fn of_mesh(mesh: &Mesh, is_shell: bool) -> GeomMass {
-    let surface = Sums::from(Vector3::zeros(), mesh, true);
+fn of_mesh(mesh: &Mesh, spread: Spread) -> GeomMass {
+    if spread == Spread::Hull {
+        let triangles = convex_hull(&mesh.vertices);
+        let hull = Mesh::new(mesh.vertices.clone(), triangles);
+        return hull.map_or(GeomMass::NONE, |hull| of_mesh(&hull, Spread::Inside));
+    }
+    let surface = Sums::from(Vector3::zeros(), mesh, Spread::Shell);
     if surface.amount <= 0.0 {
         return GeomMass::NONE;
     }
     let middle = surface.first / surface.amount;
-    let com = if is_shell {
+    let com = if spread == Spread::Shell {
         middle
     } else {
-        let solid = Sums::from(middle, mesh, false);
+        let solid = Sums::from(middle, mesh, spread);
         if solid.amount <= 0.0 {
             return GeomMass::NONE;
         }
         middle + solid.first / solid.amount
     };
-    let sums = Sums::from(com, mesh, is_shell);
+    let sums = Sums::from(com, mesh, spread);
     GeomMass {
         kg: sums.amount,
         com,
@@ -267,7 +292,7 @@ fn of_mesh(mesh: &Mesh, is_shell: bool) -> GeomMass {
 /// Half extents of the box with the same inertia as a mesh, and the frame of its principal axes,
 /// from the shortest extent along x to the longest along z. MuJoCo fits its primitives so.
 pub(crate) fn equivalent_box(mesh: &Mesh) -> Option<(Isometry3<f64>, [f64; 3])> {
-    let mass = of_mesh(mesh, false);
+    let mass = of_mesh(mesh, Spread::Inside);
     if mass.kg <= 0.0 {
         return None;
     }
@@ -298,6 +323,13 @@ mod tests {
             matter: Some(matter),
             friction: None,
             place: SourceSpan::default(),
+        }
+    }
+
+    fn kilograms(kg: f64) -> Matter {
+        Matter {
+            amount: Amount::Mass(kg),
+            spread: Spread::Inside,
         }
     }
 
@@ -340,14 +372,18 @@ mod tests {
         let as_box = TreeGeometry::Box {
             size: [0.2, 0.4, 0.6],
         };
-        for matter in [
-            Matter::Density(700.0),
-            Matter::Mass(3.0),
-            Matter::Shell(2.0),
-            Matter::ShellMass(5.0),
+        let mut masses = MeshMasses::default();
+        for (amount, spread) in [
+            (Amount::Density(700.0), Spread::Inside),
+            (Amount::Mass(3.0), Spread::Inside),
+            (Amount::Density(2.0), Spread::Shell),
+            (Amount::Mass(5.0), Spread::Shell),
+            (Amount::Density(2.0), Spread::Exact),
+            (Amount::Density(2.0), Spread::Hull),
         ] {
+            let matter = Matter { amount, spread };
             let [one, other] = [&as_mesh, &as_box]
-                .map(|geometry| together([&solid(geometry.clone(), matter)], &meshes));
+                .map(|geometry| masses.together([&solid(geometry.clone(), matter)], &meshes));
             assert!(
                 (one.kg - other.kg).abs() < 1e-9,
                 "{matter:?}: {one:?} {other:?}"
@@ -359,10 +395,49 @@ mod tests {
             assert!((one.com - Vector3::new(1.0, -2.0, 0.5)).norm() < 1e-9);
         }
         let two = [
-            solid(as_box.clone(), Matter::Mass(1.0)),
-            solid(as_box, Matter::Mass(2.0)),
+            solid(as_box.clone(), kilograms(1.0)),
+            solid(as_box, kilograms(2.0)),
         ];
-        assert!((together(&two, &meshes).kg - 3.0).abs() < 1e-12);
+        assert!((masses.together(&two, &meshes).kg - 3.0).abs() < 1e-12);
+    }
+
+    /// Masses and centres of an L-shaped prism, whole and without its last two sides, as MuJoCo 3.3.1
+    /// has them.
+    #[test]
+    fn a_mesh_weighs_by_its_inertia_as_in_mujoco() {
+        let corners = [
+            [0.0, 0.0],
+            [2.0, 0.0],
+            [2.0, 1.0],
+            [1.0, 1.0],
+            [1.0, 2.0],
+            [0.0, 2.0],
+        ];
+        let level = |z: f64| corners.map(|[x, y]| [x, y, z]);
+        let vertices = [level(0.0), level(1.0)].concat();
+        let lids = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]];
+        let mut triangles: Vec<[u32; 3]> = lids.map(|[a, b, c]| [a, c, b]).into();
+        triangles.extend(lids.map(|lid| lid.map(|corner| corner + 6)));
+        for a in 0..6 {
+            let b = (a + 1) % 6;
+            triangles.extend([[a, b, b + 6], [a, b + 6, a + 6]]);
+        }
+        let open = triangles[..16].to_vec();
+        for (triangles, spread, kg, x) in [
+            (&triangles, Spread::Inside, 300.0, 0.83333),
+            (&triangles, Spread::Exact, 300.0, 0.83333),
+            (&triangles, Spread::Hull, 350.0, 0.90476),
+            (&triangles, Spread::Shell, 1400.0, 0.85714),
+            (&open, Spread::Inside, 187.211_40, 1.08874),
+            (&open, Spread::Exact, 180.840_66, 1.08999),
+            (&open, Spread::Hull, 350.0, 0.90476),
+            (&open, Spread::Shell, 1100.0, 1.04545),
+        ] {
+            let mesh = Mesh::new(vertices.clone(), triangles.clone()).expect("it is a mesh");
+            let mass = of_mesh(&mesh, spread).times(100.0);
+            assert!((mass.kg - kg).abs() < 1e-4, "{spread:?}: {mass:?}");
+            assert!((mass.com.x - x).abs() < 1e-5, "{spread:?}: {mass:?}");
+        }
     }
 
     /// The long box lies along the x axis of its mesh, and along z of the fitted box.

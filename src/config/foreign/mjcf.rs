@@ -4,47 +4,52 @@
 //! Sites and cameras become links, so that a profile can name them. Spatial tendons and options are
 //! not read.
 
+use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::rc::Rc;
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
-use crate::foreign::geom_mass::{self, GeomMass};
+use crate::foreign::geom_mass::{GeomMass, MeshMasses};
 use crate::foreign::lookup::{Lookup, beside};
-use crate::foreign::mjcf_compiler::{Compiler, Item, MjcfAttributes, Whole, with_includes};
-use crate::foreign::mjcf_couplings::{Couplings, elements};
-use crate::foreign::mjcf_masks::{Mask, collides};
+use crate::foreign::mjcf_budget::Budget;
+use crate::foreign::mjcf_compiler::{
+    Compiler, Item, MjcfAttributes, Whole, is_absolute, with_includes,
+};
+use crate::foreign::mjcf_couplings::Couplings;
+use crate::foreign::mjcf_elements;
+use crate::foreign::mjcf_masks::{Contacts, Mask, collides};
 use crate::foreign::xml::{self, Bound, Node, Reader};
-use actcheck_base::{Diagnostics, Source, SourceSpan};
+use actcheck_base::{Diagnostic, Diagnostics, Source, SourceSpan};
 use actcheck_data::{
-    Mesh, ModelTree, TreeInertial, TreeJoint, TreeLink, TreeMimic, TreeMotion, TreeSolid,
+    Mesh, ModelTree, Spread, TreeInertial, TreeJoint, TreeLink, TreeMimic, TreeMotion, TreeSolid,
 };
 
 /// Largest effort of a joint without limits of its actuator. Units: newtons or newton metres.
 const EFFORT: f64 = 100.0;
 /// Largest velocity of joints, which MJCF does not have. Units: rad/s and m/s.
 const VELOCITY: [f64; 2] = [2.0, 0.5];
-/// Most bodies whose pairs are compared.
-const MOST_BODIES: usize = 1_000;
 /// Range of an unlimited sliding joint. Unit: metres.
 const SLIDES_M: f64 = 10.0;
 /// Deepest attachment of models to others: deeper ones attach themselves.
 const DEEPEST: usize = 8;
 
-/// A tree, its text with all included files, and warnings.
+/// A tree, its text with those of all included files and attached models, and warnings.
 pub(crate) type MjcfRead = (ModelTree, Source, Diagnostics);
 
 /// Reads a robot.
 ///
 /// # Errors
-/// Faults of the text: W031 to W036, W051, W055.
+/// Faults of the text: W031 to W037, W051, W055.
 pub(crate) fn robot(
     source: &Source,
     path: &Path,
     lookup: &Lookup,
 ) -> Result<MjcfRead, Diagnostics> {
-    whole(source, path, lookup, Purpose::Robot, 0)
+    let budget = Budget::default();
+    whole(source, File::first(path, lookup, &budget), Purpose::Robot)
+        .map(|(built, text, said)| (built.tree, text, said))
 }
 
 /// Reads an object: its joints without a name of their own move its parts, and it moves freely
@@ -57,7 +62,9 @@ pub(crate) fn object(
     path: &Path,
     lookup: &Lookup,
 ) -> Result<MjcfRead, Diagnostics> {
-    whole(source, path, lookup, Purpose::Object, 0)
+    let budget = Budget::default();
+    whole(source, File::first(path, lookup, &budget), Purpose::Object)
+        .map(|(built, text, said)| (built.tree, text, said))
 }
 
 /// The use of a model.
@@ -65,80 +72,102 @@ pub(crate) fn object(
 pub(super) enum Purpose {
     Robot,
     Object,
+    /// The objects are furniture.
+    World,
+}
+
+/// A model that has been read, and what a model that it is attached to needs to know.
+struct Built {
+    tree: ModelTree,
+    contacts: Contacts,
+    /// Positions of joints where the bodies are as the file places them, if these are not 0.
+    starts: BTreeMap<String, f64>,
 }
 
 fn whole(
     source: &Source,
-    path: &Path,
-    lookup: &Lookup,
+    file: File<'_>,
     purpose: Purpose,
-    depth: usize,
-) -> Result<MjcfRead, Diagnostics> {
-    with_model(
-        source,
-        path,
-        lookup,
-        (purpose, depth),
-        |root, mut model, reader| {
-            let world = model.unique("world");
-            model.link(TreeLink::frame(world.clone(), reader.place(root)));
-            if xml::child(root, "worldbody").is_none() {
-                reader.error(
-                    "W033",
-                    root,
-                    "`<mujoco>` has no `<worldbody>`".to_owned(),
-                    "add the bodies",
-                );
-            }
-            for worldbody in xml::children(root, "worldbody") {
-                model.worldbody(worldbody, &world, reader);
-            }
-            if purpose == Purpose::Robot {
-                model.add_passing(root);
-            }
-            model.weigh(reader);
-            model.tree.name = root.attribute("model").unwrap_or("robot").to_owned();
-            model.tree
-        },
-    )
+) -> Result<(Built, Source, Diagnostics), Diagnostics> {
+    with_model(source, file, purpose, |root, mut model, reader| {
+        let world = model.unique("world");
+        model.link(TreeLink::frame(world.clone(), reader.place(root)));
+        if xml::child(root, "worldbody").is_none() {
+            reader.error(
+                "W033",
+                root,
+                "`<mujoco>` has no `<worldbody>`".to_owned(),
+                "add the bodies",
+            );
+        }
+        for worldbody in xml::children(root, "worldbody") {
+            model.worldbody(worldbody, &world, reader);
+        }
+        model.finish(root, reader);
+        model.weigh(reader);
+        model.tree.name = root.attribute("model").unwrap_or("robot").to_owned();
+        let own = model.couplings.starts.iter();
+        model
+            .starts
+            .extend(own.map(|(name, at)| (name.clone(), *at)));
+        Built {
+            tree: model.tree,
+            contacts: model.contacts,
+            starts: model.starts,
+        }
+    })
 }
 
 /// Reads the settings of a text, and calls `read` with its root and a model without bodies. Returns
-/// its result, the text with all included files, and warnings.
+/// its result, the text with those of all included files and attached models, and warnings.
 pub(super) fn with_model<T>(
     source: &Source,
-    path: &Path,
-    lookup: &Lookup,
-    (purpose, depth): (Purpose, usize),
+    file: File<'_>,
+    purpose: Purpose,
     read: impl FnOnce(Node, Model, &mut Reader) -> T,
 ) -> Result<(T, Source, Diagnostics), Diagnostics> {
-    let Whole { source, pieces } = with_includes(source, path, lookup.files)?;
+    let Whole { source, pieces } =
+        with_includes(source, file.path, file.lookup.files, file.budget)?;
     let document = xml::parse_model(&source, &source.text)?;
     let root = document.root_element();
     let mut reader = Reader::new(&source);
     reader.pieces = pieces;
+    mjcf_elements::check(root, purpose, &mut reader);
     let compiler = Compiler::read(root, &mut reader);
+    let attached = Rc::new(RefCell::new(String::new()));
     let model = Model {
+        attached: Rc::clone(&attached),
         tree: ModelTree::default(),
         couplings: Rc::new(Couplings::read(root, &compiler, &mut reader)),
         bodies: Rc::new(names_of_bodies(root)),
         compiler: Rc::new(compiler),
         names: BTreeMap::new(),
         joint_names: BTreeMap::new(),
-        masks: BTreeMap::new(),
+        own: BTreeMap::new(),
+        contacts: Contacts::default(),
+        has_springs: false,
+        copies: BTreeMap::new(),
+        starts: BTreeMap::new(),
+        meshes: Rc::default(),
         purpose,
-        file: File {
-            path,
-            lookup,
-            depth,
-        },
+        file,
     };
     let read = read(root, model, &mut reader);
     let said = reader.found;
     if said.has_errors() {
         return Err(said);
     }
-    Ok((read, source, said))
+    // Whoever compares two models by their texts compares all of both.
+    let attached = attached.take();
+    let text = if attached.is_empty() {
+        source
+    } else {
+        Source::new(
+            source.name.to_string(),
+            format!("{}{attached}", source.text),
+        )
+    };
+    Ok((read, text, said))
 }
 
 /// A name that no other has.
@@ -164,8 +193,22 @@ fn names_of_bodies(root: Node) -> BTreeSet<String> {
 pub(super) struct File<'a> {
     pub(super) path: &'a Path,
     pub(super) lookup: &'a Lookup<'a>,
+    /// What it and all models that it belongs to may still grow by.
+    pub(super) budget: &'a Budget,
     /// Number of models that it is attached to.
     depth: usize,
+}
+
+impl<'a> File<'a> {
+    /// A file that is attached to no other.
+    pub(super) fn first(path: &'a Path, lookup: &'a Lookup<'a>, budget: &'a Budget) -> Self {
+        Self {
+            path,
+            lookup,
+            budget,
+            depth: 0,
+        }
+    }
 }
 
 /// A model being read.
@@ -179,8 +222,20 @@ pub(super) struct Model<'a> {
     names: BTreeMap<String, u32>,
     /// The same for joints: a joint often has the name of its body.
     joint_names: BTreeMap<String, u32>,
-    /// The masks of each body's colliding geoms.
-    masks: BTreeMap<String, BTreeSet<Mask>>,
+    /// The file's own bodies by the names of their links, and whether they have joints: those of
+    /// attached models are not among them.
+    own: BTreeMap<String, bool>,
+    contacts: Contacts,
+    /// Whether a spring was reported.
+    has_springs: bool,
+    /// Joints that are copies, with their names and the ends of these.
+    copies: BTreeMap<String, (String, String)>,
+    /// Starts of the joints of attached models.
+    starts: BTreeMap<String, f64>,
+    /// The texts of attached models.
+    attached: Rc<RefCell<String>>,
+    /// Meshes of the file that differ from those of their own files; `None` for those with a fault.
+    pub(super) meshes: Rc<RefCell<BTreeMap<String, Option<Rc<Mesh>>>>>,
     purpose: Purpose,
     pub(super) file: File<'a>,
 }
@@ -189,6 +244,10 @@ impl Model<'_> {
     /// A name that no other link has.
     pub(super) fn unique(&mut self, name: &str) -> String {
         unique(&mut self.names, name)
+    }
+
+    pub(super) fn is_robot(&self) -> bool {
+        self.purpose == Purpose::Robot
     }
 
     /// Another one of the same file, without bodies.
@@ -200,7 +259,13 @@ impl Model<'_> {
             bodies: Rc::clone(&self.bodies),
             names: BTreeMap::new(),
             joint_names: BTreeMap::new(),
-            masks: BTreeMap::new(),
+            own: BTreeMap::new(),
+            contacts: Contacts::default(),
+            has_springs: false,
+            copies: BTreeMap::new(),
+            starts: BTreeMap::new(),
+            attached: Rc::clone(&self.attached),
+            meshes: Rc::clone(&self.meshes),
             ..*self
         }
     }
@@ -210,8 +275,11 @@ impl Model<'_> {
     }
 
     /// Keeps a mesh that the file itself contains.
-    pub(super) fn keep_mesh(&mut self, name: &str, mesh: Mesh) {
-        self.tree.inline_meshes.insert(name.to_owned(), mesh);
+    pub(super) fn keep_mesh(&mut self, name: &str, mesh: &Mesh) {
+        let known = &mut self.tree.inline_meshes;
+        if !known.contains_key(name) {
+            known.insert(name.to_owned(), mesh.clone());
+        }
     }
 
     /// Adds a link without mass and shapes, fixed to another at a pose in its frame.
@@ -222,61 +290,79 @@ impl Model<'_> {
         self.tree.joints.push(joint);
     }
 
-    /// Adds the pairs of bodies that pass through each other: those that `<exclude>` names, and
-    /// those whose geoms never collide with each other.
-    fn add_passing(&mut self, root: Node) {
-        let mut passing: BTreeSet<[&str; 2]> = BTreeSet::new();
-        let excludes = elements(root, "contact").filter(|contact| contact.has_tag_name("exclude"));
-        for exclude in excludes {
-            if let (Some(first), Some(second)) =
-                (exclude.attribute("body1"), exclude.attribute("body2"))
-            {
-                passing.insert([first.min(second), first.max(second)]);
-            }
+    /// Adds what depends on all bodies: the contacts between them, and the couplings of joints.
+    fn finish(&mut self, root: Node, reader: &mut Reader) {
+        let is_known = |body: &str| self.names.contains_key(body);
+        if self.is_robot() {
+            self.contacts.read(root, is_known, reader);
         }
-        let solid: Vec<(&String, &BTreeSet<Mask>)> = self
-            .masks
-            .iter()
-            .filter(|(_, masks)| !masks.is_empty())
+        if self.is_robot() && self.file.depth == 0 {
+            let passing = self.contacts.passing(is_known);
+            self.tree.passing.extend(passing);
+        }
+        let couplings = Rc::clone(&self.couplings);
+        let joints = self.tree.joints.iter().map(|joint| joint.name.clone());
+        let joints: BTreeSet<String> = joints.collect();
+        // A name counts for all copies of a joint.
+        let written: BTreeSet<&str> = root
+            .descendants()
+            .filter(|node| node.has_tag_name("joint") || node.has_tag_name("freejoint"))
+            .filter_map(|joint| joint.attribute("name"))
             .collect();
-        // More links are refused when the text is read.
-        let solid = if solid.len() > MOST_BODIES {
-            Vec::new()
-        } else {
-            solid
-        };
-        for (idx, (first, of_first)) in solid.iter().enumerate() {
-            for (second, of_second) in &solid[idx + 1..] {
-                if !of_first
-                    .iter()
-                    .any(|mask| of_second.iter().any(|other| mask.meets(*other)))
-                {
-                    passing.insert([first.as_str(), second.as_str()]);
-                }
+        for named in &couplings.named {
+            if !joints.contains(&named.name) && !written.contains(named.name.as_str()) {
+                reader.found.push(named.unknown());
             }
         }
-        let known = passing
-            .into_iter()
-            .filter(|pair| pair.iter().all(|body| self.names.contains_key(*body)))
-            .map(|pair| pair.map(str::to_owned));
-        self.tree.passing.extend(known);
+        for joint in &mut self.tree.joints {
+            let (written, suffix) = match self.copies.get(&joint.name) {
+                Some((written, suffix)) => (written.as_str(), suffix.as_str()),
+                None => (joint.name.as_str(), ""),
+            };
+            let known = couplings.mimics.get(&joint.name);
+            let Some((leader, factor, offset)) = known.or(couplings.mimics.get(written)) else {
+                continue;
+            };
+            let copy = format!("{leader}{suffix}");
+            let leader = if joints.contains(&copy) {
+                &copy
+            } else {
+                leader
+            };
+            // The file that names joints of an attached model does not know where these start.
+            let start = |name: &str| self.starts.get(name).copied().unwrap_or(0.0);
+            joint.mimic = Some(TreeMimic {
+                leader: leader.clone(),
+                factor: *factor,
+                offset: offset + start(&joint.name) - factor * start(leader),
+                place: joint.place.clone(),
+            });
+        }
     }
 
     /// Adds the bodies of a world, and its solids, which are fixed.
     fn worldbody(&mut self, worldbody: Node, world: &str, reader: &mut Reader) {
         let compiler = Rc::clone(&self.compiler);
-        let content = compiler.content(worldbody, worldbody.attribute("childclass"), reader);
+        let content = compiler.content(
+            worldbody,
+            worldbody.attribute("childclass"),
+            self.file.budget,
+            reader,
+        );
         let [solids, visuals] = self.geoms(&content, &Isometry3::identity(), reader);
         if let Some(link) = self.tree.links.iter_mut().find(|link| link.name == world) {
             link.solids.extend(solids);
             link.visuals.extend(visuals);
         }
+        let named = content.iter().filter(|geom| geom.is("geom"));
+        let named = named.filter_map(|geom| Some((geom.name()?, world.to_owned())));
+        self.contacts.bodies.extend(named);
         self.children(&content, world, &Isometry3::identity(), reader);
     }
 
     /// Adds the bodies, sites and cameras in a body. `shift` is the body's frame in the frame of
     /// its link.
-    fn children(
+    pub(super) fn children(
         &mut self,
         content: &[Item<'_>],
         link: &str,
@@ -291,17 +377,16 @@ impl Model<'_> {
                 "body" => self.body(item, link, &shift, reader),
                 "site" | "camera" => {
                     let Some(name) = item.name() else { continue };
-                    let pose = compiler.pose(&compiler.attributes(node, class), node, reader);
-                    let turned = if item.is("camera") {
-                        lens()
-                    } else {
-                        Isometry3::identity()
+                    let attributes = compiler.attributes(node, class);
+                    let pose = match item.is("camera") {
+                        true => compiler.pose(&attributes, node, reader) * lens(),
+                        false => compiler.site(&attributes, node, reader),
                     };
                     // A name that a body has, too, is that of the body's link.
                     let is_taken = self.bodies.contains(&name);
                     let ending = if is_taken { "_frame" } else { "" };
                     let name = self.unique(&format!("{name}{ending}"));
-                    self.frame(&name, link, shift * pose * turned, reader.place(node));
+                    self.frame(&name, link, shift * pose, reader.place(node));
                 }
                 "attach" => self.attach(item, link, &shift, reader),
                 "composite" | "flexcomp" => {
@@ -338,17 +423,17 @@ impl Model<'_> {
             Ok(source) => source,
             Err(reason) => return refused(format!("cannot read {}: {reason}", path.display())),
         };
-        let read = whole(
-            &source,
-            &path,
-            self.file.lookup,
-            self.purpose,
-            self.file.depth + 1,
-        );
-        let tree = match read {
-            Ok((tree, _, said)) => {
+        let attached = File {
+            path: &path,
+            depth: self.file.depth + 1,
+            ..self.file
+        };
+        let read = whole(&source, attached, self.purpose);
+        let built = match read {
+            Ok((built, text, said)) => {
                 reader.found.extend(said);
-                tree
+                self.attached.borrow_mut().push_str(&text.text);
+                built
             }
             Err(faults) => return reader.found.extend(faults),
         };
@@ -362,14 +447,22 @@ impl Model<'_> {
             shift * self.compiler.pose(&attributes, node, reader)
         };
         let body = node.attribute("body");
-        let folder = file.rsplit_once('/').map_or("", |(folder, _)| folder);
+        // Its meshes are named from its own folder.
+        let inside = path.parent().and_then(|own| own.strip_prefix(folder).ok());
+        let folder = inside.map_or_else(String::new, |inside| inside.display().to_string());
         let graft = Graft {
             prefix: &prefix,
-            folder,
+            folder: &folder,
             body,
         };
-        match graft.of(tree) {
-            Some(tree) => self.graft(tree, link, &pose),
+        match graft.of(built.tree) {
+            Some(tree) => {
+                self.contacts.attach(built.contacts, &prefix);
+                let starts = built.starts.into_iter();
+                self.starts
+                    .extend(starts.map(|(joint, at)| (format!("{prefix}{joint}"), at)));
+                self.graft(tree, link, &pose);
+            }
             None => refused_body(node, body.unwrap_or_default(), &path, reader),
         }
     }
@@ -393,6 +486,7 @@ impl Model<'_> {
         for joint in tree.joints {
             unique(&mut self.joint_names, &joint.name);
             let is_first = Some(&joint.parent) == root_name.as_ref();
+            let joint = self.driven(joint);
             self.tree.joints.push(if is_first {
                 TreeJoint {
                     parent: link.to_owned(),
@@ -411,6 +505,30 @@ impl Model<'_> {
         self.tree.inline_meshes.extend(tree.inline_meshes);
     }
 
+    /// A joint of an attached model, with the effort and the range of this file's actuators.
+    fn driven(&self, mut joint: TreeJoint) -> TreeJoint {
+        if let Some(effort) = self.couplings.efforts.get(&joint.name) {
+            let is_stated = joint.effort > 0.0 && joint.effort != EFFORT;
+            joint.effort = if is_stated {
+                joint.effort.min(*effort)
+            } else {
+                *effort
+            };
+        }
+        let slides = joint.motion == TreeMotion::Prismatic;
+        let is_free = match joint.motion {
+            TreeMotion::Continuous => true,
+            _ => slides && [joint.lower, joint.upper] == [-SLIDES_M, SLIDES_M],
+        };
+        if let Some(range) = self.couplings.ranges.get(&joint.name).filter(|_| is_free) {
+            [joint.lower, joint.upper] = *range;
+            if !slides {
+                joint.motion = TreeMotion::Revolute;
+            }
+        }
+        joint
+    }
+
     pub(super) fn body(
         &mut self,
         item: &Item<'_>,
@@ -420,13 +538,16 @@ impl Model<'_> {
     ) {
         let compiler = Rc::clone(&self.compiler);
         let body = item.node;
+        if !self.file.budget.enter(body, reader) {
+            return;
+        }
         let class = body.attribute("childclass").or(item.class);
         let place = reader.place(body);
         let name = item.name().unwrap_or_else(|| "body".to_owned());
         let name = self.unique(&name);
         let attributes = compiler.attributes(body, item.class);
         let mut at = shift * compiler.pose(&attributes, body, reader);
-        let content = compiler.content(body, class, reader);
+        let content = compiler.content(body, class, self.file.budget, reader);
         let inside: Vec<Item<'_>> = content
             .into_iter()
             .map(|inner| Item {
@@ -440,6 +561,8 @@ impl Model<'_> {
                 || joint.is("joint")
                     && compiler.attributes(joint.node, joint.class).get("type") == Some("free")
         };
+        let is_jointed = |joint: &Item| joint.is("joint") || joint.is("freejoint");
+        self.own.insert(name.clone(), inside.iter().any(is_jointed));
         let joints: Vec<&Item> = inside
             .iter()
             .filter(|joint| joint.is("joint") && !is_free(joint))
@@ -451,7 +574,7 @@ impl Model<'_> {
             let attributes = compiler.attributes(joint.node, joint.class);
             let anchor = attributes
                 .get("pos")
-                .and_then(|text| reader.numbers::<3>(joint.node, text, Bound::Finite));
+                .and_then(|text| reader.numbers::<3>(joint.node, text, Bound::Within));
             let anchor = joint.shift * nalgebra::Point3::from(anchor.unwrap_or([0.0; 3]));
             let anchor = Translation3::from(anchor.coords);
             let link = if idx + 1 == joints.len() {
@@ -475,7 +598,7 @@ impl Model<'_> {
         }
         if joints.is_empty() {
             let free = inside.iter().any(|joint| is_free(&joint));
-            let (motion, ending) = if free && self.purpose == Purpose::Robot {
+            let (motion, ending) = if free && self.purpose != Purpose::Object {
                 (TreeMotion::Floating, "free")
             } else {
                 (TreeMotion::Fixed, "fixed")
@@ -488,14 +611,16 @@ impl Model<'_> {
         }
         let [solids, visuals] = self.geoms(&inside, &own, reader);
         if self.purpose == Purpose::Robot {
-            let geoms = inside
-                .iter()
-                .filter(|geom| geom.is("geom"))
-                .map(|geom| compiler.attributes(geom.node, geom.class));
-            let masks = geoms
-                .filter(|geom| collides(geom, &compiler))
-                .map(|geom| Mask::of(&geom));
-            self.masks.insert(name.clone(), masks.collect());
+            let mut masks = BTreeSet::new();
+            for geom in inside.iter().filter(|geom| geom.is("geom")) {
+                let attributes = compiler.attributes(geom.node, geom.class);
+                if collides(&attributes, &compiler) {
+                    masks.insert(Mask::of(&attributes));
+                }
+                let bodies = &mut self.contacts.bodies;
+                bodies.extend(geom.name().map(|geom| (geom, name.clone())));
+            }
+            self.contacts.masks.insert(name.clone(), masks);
         }
         let stated = inside
             .iter()
@@ -510,6 +635,7 @@ impl Model<'_> {
             place,
         });
         self.children(&inside, &name, &own, reader);
+        self.file.budget.leave();
     }
 
     /// Adds a joint. Returns `None` after it has reported a fault.
@@ -553,12 +679,16 @@ impl Model<'_> {
             );
             return None;
         };
-        let range = self.range(joint, attributes, &name, slides, reader)?;
+        let names = [&name, joint.attribute("name").unwrap_or(&name)];
+        let range = self.range(joint, attributes, (names, slides), reader);
         let (motion, [lower, upper]) = match (range, slides) {
             (Some(range), _) => (motion, range),
             (None, true) => (motion, [-SLIDES_M, SLIDES_M]),
             (None, false) => (TreeMotion::Continuous, [f64::NEG_INFINITY, f64::INFINITY]),
         };
+        // A name that elements use counts for all copies of the joint.
+        let written = joint.attribute("name").unwrap_or(&name);
+        self.check_spring(joint, attributes, &name, reader);
         let start = self.couplings.start(&name);
         let origin = match start {
             0.0 => origin,
@@ -566,9 +696,12 @@ impl Model<'_> {
             _ => origin * UnitQuaternion::from_axis_angle(&direction, -start),
         };
         let place = reader.place(joint);
-        let mimic = self.couplings.mimics.get(&name).cloned();
-        let effort = self.effort(joint, attributes, &name, reader);
+        let effort = self.effort(joint, attributes, [&name, written], reader);
         let unique = unique(&mut self.joint_names, &name);
+        if !item.suffix.is_empty() {
+            let copy = (written.to_owned(), item.suffix.clone());
+            self.copies.insert(unique.clone(), copy);
+        }
         self.tree.joints.push(TreeJoint {
             motion,
             axis,
@@ -576,59 +709,63 @@ impl Model<'_> {
             upper,
             effort,
             velocity: VELOCITY[usize::from(slides)],
-            damping: attributes.number("damping").unwrap_or(0.0),
+            damping: attributes.number("damping", reader).unwrap_or(0.0),
             // Robots overcome it with their motors.
             friction: attributes
-                .number("frictionloss")
-                .filter(|_| self.purpose == Purpose::Object)
+                .number("frictionloss", reader)
+                .filter(|_| self.purpose != Purpose::Robot)
                 .unwrap_or(0.0),
-            mimic: mimic.map(|(leader, factor, offset)| TreeMimic {
-                leader,
-                factor,
-                offset,
-                place: place.clone(),
-            }),
             ..TreeJoint::fixed(unique, [parent, child], origin, place)
         });
         Some(())
     }
 
+    /// Reports a spring: it is an error of an object, and an unknown force of a robot's motors.
+    fn check_spring(
+        &mut self,
+        joint: Node,
+        attributes: &MjcfAttributes<'_>,
+        name: &str,
+        reader: &mut Reader,
+    ) {
+        for key in ["springref", "ref"] {
+            attributes.number(key, reader);
+        }
+        let stiffness = attributes.number("stiffness", reader).unwrap_or(0.0);
+        let is_first = !self.has_springs;
+        if stiffness <= 0.0 {
+            return;
+        }
+        self.has_springs = true;
+        if self.purpose != Purpose::Robot {
+            let message = format!("the spring of the joint `{name}` can't be simulated");
+            let help =
+                "the model would be another one without it: remove `stiffness` if that is meant";
+            reader.error("W035", joint, message, help);
+        } else if is_first {
+            let message = format!("the spring of the joint `{name}` is left out");
+            let help = "springs decide only where closed loops leave a choice; those of other joints \
+                        are left out, too";
+            reader.warning("W036", joint, message, help);
+        }
+    }
+
     /// Returns the limits of a joint: its own, otherwise those of its position servo, if it has
-    /// any. Returns `None` after it has reported a fault.
+    /// any.
     fn range(
         &self,
         joint: Node,
         attributes: &MjcfAttributes<'_>,
-        name: &str,
-        slides: bool,
+        ([name, written], slides): ([&str; 2], bool),
         reader: &mut Reader,
-    ) -> Option<Option<[f64; 2]>> {
-        let range = match attributes.get("range") {
-            Some(text) => Some(reader.numbers::<2>(joint, text, Bound::Finite)?),
-            None => None,
-        };
-        if let Some([lower, upper]) = range.filter(|[lower, upper]| lower > upper) {
-            let message = format!(
-                "the joint `{name}` has a lower limit of {lower} above its upper limit of {upper}"
-            );
-            reader.error(
-                "W034",
-                joint,
-                message,
-                "write the smaller number of `range` first",
-            );
-            return None;
-        }
-        let limited = match attributes.get("limited") {
-            Some("true") => true,
-            Some("false") => false,
-            _ => range.is_some(),
-        };
+    ) -> Option<[f64; 2]> {
+        let range = self
+            .compiler
+            .limits(joint, attributes, ["range", "limited"], reader);
         let unit = if slides { 1.0 } else { self.compiler.angle };
-        let own = range
-            .filter(|_| limited)
-            .map(|range| range.map(|end| end * unit));
-        Some(own.or(self.couplings.ranges.get(name).copied()))
+        let own = range.map(|range| range.map(|end| end * unit));
+        let of_servo = &self.couplings.ranges;
+        own.or_else(|| of_servo.get(name).or(of_servo.get(written)).copied())
     }
 
     /// Returns the largest effort of a joint: that of its actuators, but at most its own limit.
@@ -636,69 +773,93 @@ impl Model<'_> {
         &self,
         joint: Node,
         attributes: &MjcfAttributes<'_>,
-        name: &str,
+        [name, written]: [&str; 2],
         reader: &mut Reader,
     ) -> f64 {
-        let own = attributes
-            .get("actuatorfrcrange")
-            .filter(|_| attributes.get("actuatorfrclimited") != Some("false"))
-            .and_then(|text| reader.numbers::<2>(joint, text, Bound::Finite))
-            .map(|[lower, upper]| f64::max(-lower, upper));
-        let of_actuators = self.couplings.efforts.get(name).copied();
+        let keys = ["actuatorfrcrange", "actuatorfrclimited"];
+        let own = self.compiler.limits(joint, attributes, keys, reader);
+        let own = own.map(|[lower, upper]| f64::max(-lower, upper));
+        let efforts = &self.couplings.efforts;
+        let of_actuators = efforts.get(name).or(efforts.get(written)).copied();
         let effort = [own, of_actuators]
             .into_iter()
             .flatten()
             .filter(|effort| *effort > 0.0)
             .reduce(f64::min);
-        let unstated = if self.couplings.is_passive(name) {
-            0.0
-        } else {
-            EFFORT
-        };
+        let is_passive = [name, written].map(|name| self.couplings.is_passive(name));
+        let unstated = if is_passive == [true; 2] { 0.0 } else { EFFORT };
         effort.unwrap_or(unstated)
     }
 
-    /// Gives each link without a stated mass that of its geoms, and applies the rules of
-    /// `<compiler>` to all masses.
+    /// Gives each body of this file without a stated mass that of its geoms, and applies the rules of
+    /// `<compiler>`. Those of attached models have been weighed by their own rules, but the mass of
+    /// the whole is that of all bodies.
     pub(super) fn weigh(&mut self, reader: &mut Reader) {
+        let rules = Rc::clone(&self.compiler);
+        let from_geoms = rules.masses.from_geoms != Some(false);
         let mut meshes = BTreeMap::new();
         let mut shapes = self.shapes();
+        let mut masses = MeshMasses::default();
+        let mut weighed = BTreeMap::new();
         let tree = &self.tree;
-        let unweighed = tree.links.iter().skip(1);
-        for link in unweighed.filter(|link| link.inertial.is_none()) {
+        let own = tree
+            .links
+            .iter()
+            .filter(|link| link.inertial.is_none())
+            .filter_map(|link| Some((link, *self.own.get(&link.name)?)));
+        for (link, moves) in own {
             let geoms = link.solids.iter().chain(&link.visuals);
-            for geom in geoms.filter(|geom| geom.matter.is_some()) {
+            let heavy = geoms.filter(|geom| from_geoms && geom.matter.is_some());
+            for geom in heavy.clone() {
                 shapes.load(geom, tree, &mut meshes, &mut reader.found);
+                let spread = geom.matter.map_or(Spread::Inside, |matter| matter.spread);
+                let unit = masses.of_unit(&geom.geometry, spread, &meshes);
+                if spread == Spread::Exact && unit.is_some_and(|unit| unit.kg <= 0.0) {
+                    let message =
+                        "this mesh has no exact inertia: its triangles are turned inwards";
+                    let help = "write `inertia=\"legacy\"` at its `<mesh>`, or turn its triangles";
+                    let fault = Diagnostic::error("W037", message)
+                        .at(&geom.place.source, xml::tag(&geom.place));
+                    reader.found.push(fault.help(help));
+                }
             }
-        }
-        let rules = Rc::clone(&self.compiler);
-        // The first link is the world, which does not move and has no mass.
-        for link in self.tree.links.iter_mut().skip(1) {
-            if link.inertial.is_none() {
-                let geoms = link.solids.iter().chain(&link.visuals);
-                let GeomMass { kg, com, about_com } = geom_mass::together(geoms, &meshes);
-                link.inertial = (kg > 0.0).then(|| TreeInertial {
+            let GeomMass { kg, com, about_com } = masses.together(heavy, &meshes);
+            if kg > 0.0 || rules.masses.least[0] > 0.0 {
+                let inertial = TreeInertial {
                     pose: Isometry3::translation(com.x, com.y, com.z),
                     kg,
                     about_com,
                     place: link.place.clone(),
                     moments_place: None,
-                });
+                };
+                weighed.insert(link.name.clone(), inertial);
+            } else if !from_geoms && moves {
+                let message = format!("the body `{}` moves and has no mass", link.name);
+                let help =
+                    "add an `<inertial>`: with `inertiafromgeom=\"false\"`, geoms have no mass";
+                let fault = Diagnostic::error("W033", message)
+                    .at(&link.place.source, xml::tag(&link.place));
+                reader.found.push(fault.help(help));
             }
-            if let Some(inertial) = &mut link.inertial {
+        }
+        for link in &mut self.tree.links {
+            if let Some(inertial) = weighed.remove(&link.name) {
+                link.inertial = Some(inertial);
+            }
+            if let Some(inertial) = &mut link.inertial
+                && self.own.contains_key(&link.name)
+            {
                 rules.masses.apply(inertial);
             }
         }
-        let inertials = || {
-            self.tree
-                .links
-                .iter()
-                .filter_map(|link| link.inertial.as_ref())
-        };
-        let total: f64 = inertials().map(|inertial| inertial.kg).sum();
-        if let Some(wanted) = rules.masses.total_kg.filter(|_| total > 0.0) {
-            let links = self.tree.links.iter_mut();
-            for inertial in links.filter_map(|link| link.inertial.as_mut()) {
+        let inertials = self.tree.links.iter_mut();
+        let inertials: Vec<&mut TreeInertial> = inertials
+            .filter_map(|link| link.inertial.as_mut())
+            .collect();
+        let total: f64 = inertials.iter().map(|inertial| inertial.kg).sum();
+        let wanted = rules.masses.total_kg;
+        if let Some(wanted) = wanted.filter(|_| total > 0.0 && self.file.depth == 0) {
+            for inertial in inertials {
                 inertial.kg *= wanted / total;
                 inertial.about_com *= wanted / total;
             }
@@ -783,7 +944,7 @@ impl Graft<'_> {
                 if let actcheck_data::TreeGeometry::Mesh { file, .. } = &mut solid.geometry {
                     if tree.inline_meshes.contains_key(file) {
                         file.insert_str(0, self.prefix);
-                    } else if !self.folder.is_empty() && !Path::new(file).is_absolute() {
+                    } else if !self.folder.is_empty() && !is_absolute(file) {
                         *file = format!("{}/{file}", self.folder);
                     }
                 }
@@ -820,13 +981,13 @@ fn inertial(
     let [kg] = reader.numbers::<1>(node, written, Bound::Mass)?;
     let about_com = match (attributes.get("fullinertia"), attributes.get("diaginertia")) {
         (Some(text), _) => {
-            let [xx, yy, zz, xy, xz, yz] = reader.numbers(node, text, Bound::Finite)?;
+            let [xx, yy, zz, xy, xz, yz] = reader.numbers(node, text, Bound::Within)?;
             Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
         }
         (None, Some(text)) => Matrix3::from_diagonal(&Vector3::from(reader.numbers::<3>(
             node,
             text,
-            Bound::Finite,
+            Bound::Within,
         )?)),
         (None, None) if kg > 0.0 => {
             let message = "`<inertial>` has neither `diaginertia` nor `fullinertia`".to_owned();
@@ -856,6 +1017,7 @@ fn lens() -> Isometry3<f64> {
 mod tests {
     use super::*;
     use actcheck_base::Files;
+    use std::f64::consts::FRAC_PI_6;
 
     fn read(bodies: &str, more: &str) -> Result<ModelTree, Diagnostics> {
         let text = format!(
@@ -867,6 +1029,86 @@ mod tests {
         };
         let source = Source::new("robot.xml", text);
         robot(&source, Path::new("robot.xml"), &lookup).map(|(tree, ..)| tree)
+    }
+
+    /// Reads the first of some files in one folder.
+    fn read_files(files: &[(&str, &str)]) -> Result<ModelTree, String> {
+        let folder = tempfile::tempdir().expect("there is room");
+        for (path, text) in files {
+            let path = folder.path().join(path);
+            std::fs::create_dir_all(path.parent().expect("a folder")).expect("it is new");
+            std::fs::write(path, text).expect("there is room");
+        }
+        let lookup = Lookup {
+            files: &Files::Disk,
+            folders: Vec::new(),
+        };
+        let (name, text) = files[0];
+        let source = Source::new(name, text.to_owned());
+        robot(&source, &folder.path().join(name), &lookup)
+            .map(|(tree, ..)| tree)
+            .map_err(|faults| faults.to_string())
+    }
+
+    /// A few lines ask for billions of bodies, of files, or of attached models.
+    #[test]
+    fn models_that_explode_are_refused_at_once() {
+        let said = |files: &[(&str, &str)]| {
+            let start = std::time::Instant::now();
+            let said = read_files(files).expect_err("it is far too large");
+            assert!(said.contains("W055"), "{said}");
+            assert!(said.matches("error").count() <= 2, "{said}");
+            assert!(start.elapsed().as_secs_f64() < 5.0, "{:?}", start.elapsed());
+            said
+        };
+        let nested = |open: &str, close: &str, n: usize| {
+            let inside = "<geom size=\"0.1\"/>";
+            let body = format!("{}{inside}{}", open.repeat(n), close.repeat(n));
+            format!("<mujoco><worldbody>{body}</worldbody></mujoco>")
+        };
+        let copies = "<replicate count=\"1000\">";
+        let bodies = nested(&format!("{copies}<body>"), "</body></replicate>", 3);
+        assert!(said(&[("a.xml", &bodies)]).contains("more than 1000 bodies"));
+        let geoms = nested(copies, "</replicate>", 5);
+        assert!(said(&[("a.xml", &geoms)]).contains("more than 10000 elements"));
+        let frames = nested("<frame>", "</frame>", 900);
+        assert!(said(&[("a.xml", &frames)]).contains("frames in each other"));
+        said(&[("a.xml", &nested("<body>", "</body>", 4_000))]);
+
+        let include = |n: usize| {
+            let twice = format!("<include file=\"{}.xml\"/>", n + 1).repeat(8);
+            (format!("{n}.xml"), format!("<mujoco>{twice}</mujoco>"))
+        };
+        let mut files: Vec<(String, String)> = (0..7).map(include).collect();
+        files.push((
+            "7.xml".to_owned(),
+            "<mujoco><worldbody/></mujoco>".to_owned(),
+        ));
+        let of = |files: &[(String, String)]| -> String {
+            let files: Vec<(&str, &str)> = files
+                .iter()
+                .map(|(name, text)| (name.as_str(), text.as_str()))
+                .collect();
+            said(&files)
+        };
+        assert!(of(&files).contains("more than 1000 files"));
+
+        let attach = |n: usize| {
+            let asset = format!("<asset><model name=\"m\" file=\"{}.xml\"/></asset>", n + 1);
+            let bodies: String = (0..8)
+                .map(|idx| format!("<frame><attach model=\"m\" prefix=\"{idx}_\"/></frame>"))
+                .collect();
+            let text = format!("<mujoco>{asset}<worldbody>{bodies}</worldbody></mujoco>");
+            (format!("{n}.xml"), text)
+        };
+        let mut files: Vec<(String, String)> = (0..7).map(attach).collect();
+        files.push((
+            "7.xml".to_owned(),
+            "<mujoco><worldbody/></mujoco>".to_owned(),
+        ));
+        assert!(of(&files).contains("more than 1000 files"));
+        files[7].1 = "<mujoco><worldbody><body/></worldbody></mujoco>".to_owned();
+        of(&files);
     }
 
     /// The mass of a link.
@@ -986,6 +1228,56 @@ mod tests {
         assert_eq!(servo, Some(6.0));
         assert_eq!(effort("<motor forcerange=\"-3 3\"/>"), Some(1.0));
         assert_eq!(effort("<position kp=\"9\"/><motor/>"), Some(1.0));
+    }
+
+    /// Bodies without a mass are raised to the least one; an attached model is weighed by its own
+    /// rules alone, but the mass of the whole is that of all bodies. (As in MuJoCo 3.3.1.)
+    #[test]
+    fn masses_follow_the_rules_of_their_own_file() {
+        let arm = |rules: &str| {
+            format!(
+                "<mujoco><compiler {rules}/><asset><model name=\"h\" file=\"h.xml\"/></asset><worldbody>\
+                 <body name=\"a\"><joint/><geom size=\"0.05\"/><body name=\"empty\"><site name=\"s\"/></body>\
+                 <frame><attach model=\"h\" body=\"h\" prefix=\"p_\"/></frame></body></worldbody></mujoco>"
+            )
+        };
+        let hand = |rules: &str| {
+            format!(
+                "<mujoco><compiler {rules}/><worldbody><body name=\"h\"><joint/><geom size=\"0.01\"/></body>\
+                 </worldbody></mujoco>"
+            )
+        };
+        for (of_arm, of_hand, masses) in [
+            ("", "", [FRAC_PI_6, 0.0, 0.004_189]),
+            (
+                "",
+                "boundmass=\"3\" boundinertia=\"0.3\"",
+                [FRAC_PI_6, 0.0, 3.0],
+            ),
+            ("boundmass=\"7\"", "boundmass=\"3\"", [7.0, 7.0, 3.0]),
+            ("boundmass=\"7\"", "", [7.0, 7.0, 0.004_189]),
+            ("", "settotalmass=\"5\"", [FRAC_PI_6, 0.0, 0.004_189]),
+            (
+                "settotalmass=\"9\"",
+                "settotalmass=\"5\"",
+                [8.928_571, 0.0, 0.071_429],
+            ),
+        ] {
+            let tree = read_files(&[("a.xml", &arm(of_arm)), ("h.xml", &hand(of_hand))]);
+            let tree = tree.expect("it is valid");
+            for (link, expected) in ["a", "empty", "p_h"].into_iter().zip(masses) {
+                let found = kg(&tree, link);
+                assert!(
+                    (found - expected).abs() < 1e-5,
+                    "{link}: {found}, {of_arm}, {of_hand}"
+                );
+            }
+            assert!(tree.link("s").is_some_and(|site| site.inertial.is_none()));
+        }
+        let said = read_files(&[("a.xml", &hand("inertiafromgeom=\"false\""))]);
+        assert!(said.is_err_and(|said| said.contains("moves and has no mass")));
+        let tree = read_files(&[("a.xml", &hand("inertiafromgeom=\"false\" boundmass=\"2\""))]);
+        assert!((kg(&tree.expect("it is valid"), "h") - 2.0).abs() < 1e-9);
     }
 
     /// A box between two points is as deep as it is wide, and a mesh of vertices alone is their

@@ -2,22 +2,22 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use nalgebra::{
-    Isometry3, Matrix3, Quaternion, Rotation3, Translation3, Unit, UnitQuaternion, Vector3,
+    Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, Unit, UnitQuaternion, Vector3,
 };
 
 use crate::foreign::lookup::beside;
+use crate::foreign::mjcf_budget::Budget;
 use crate::foreign::xml::{self, Bound, Node, Pieces, Reader};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Source, did_you_mean};
-use actcheck_data::TreeInertial;
+use actcheck_data::{Spread, TreeInertial};
 
 /// Deepest inclusion of files: deeper ones include themselves.
 const DEEPEST: usize = 8;
 /// Most copies of a `<replicate>`.
 const MOST_COPIES: usize = 1_000;
-/// Most elements of a body, with those of all copies.
-const MOST_ITEMS: usize = 10_000;
 /// Types of geoms.
 const GEOMS: [&str; 9] = [
     "plane",
@@ -46,6 +46,21 @@ const ACTUATORS: [&str; 9] = [
     "adhesion",
 ];
 
+/// The words of attributes of `<compiler>`.
+const KEYWORDS: [(&str, &[&str]); 7] = [
+    ("angle", &["radian", "degree"]),
+    ("coordinate", &["local", "global"]),
+    ("autolimits", &["true", "false"]),
+    ("balanceinertia", &["true", "false"]),
+    ("strippath", &["true", "false"]),
+    ("fitaabb", &["true", "false"]),
+    ("inertiafromgeom", &["true", "false", "auto"]),
+];
+/// Attributes of rotations other than `quat`.
+const TURNS: [&str; 4] = ["axisangle", "euler", "xyaxes", "zaxis"];
+/// Shapes that may be stated by their ends.
+const LONG: [&str; 4] = ["capsule", "cylinder", "box", "ellipsoid"];
+
 type Values = BTreeMap<String, String>;
 
 /// Settings, default classes and meshes of a file.
@@ -56,13 +71,15 @@ pub(super) struct Compiler {
     /// Default attributes by class and element.
     defaults: BTreeMap<String, BTreeMap<String, Values>>,
     /// By the mesh's name.
-    pub(super) meshes: BTreeMap<String, MeshAsset>,
+    pub(super) meshes: BTreeMap<String, Rc<MeshAsset>>,
     /// Files of other models, by their names.
     pub(super) models: BTreeMap<String, String>,
     /// Geoms that a `<pair>` lets collide.
     pub(super) paired: BTreeSet<String>,
     /// The basis of masses.
     pub(super) masses: MassRules,
+    /// Whether a range is a limit unless the file says otherwise.
+    limits_itself: bool,
     /// Whether primitives are fitted to the boxes around meshes instead of to their moments.
     pub(super) fits_boxes: bool,
 }
@@ -79,8 +96,8 @@ pub(super) struct MeshAsset {
     /// Corners of a mesh that the model's file contains, and its triangles, if it has any.
     pub(super) vertices: Vec<[f64; 3]>,
     pub(super) triangles: Vec<[u32; 3]>,
-    /// Whether only its surface has a mass.
-    pub(super) is_shell: bool,
+    /// How its mass is spread.
+    pub(super) spread: Spread,
 }
 
 /// The attributes of `<compiler>` that decide about masses.
@@ -146,10 +163,23 @@ impl<'a> MjcfAttributes<'a> {
             .map(str::trim)
     }
 
-    /// Returns the first number of an attribute; `None` if there is none, or it is not a number.
-    pub(super) fn number(&self, name: &str) -> Option<f64> {
-        let number: f64 = self.get(name)?.split_whitespace().next()?.parse().ok()?;
-        number.is_finite().then_some(number)
+    /// Returns the rotation that is not a quaternion, with its name: its own, otherwise that of its
+    /// class.
+    fn turn(&self) -> Option<(&'static str, &'a str)> {
+        let own = TURNS
+            .into_iter()
+            .find_map(|key| Some((key, self.node.attribute(key)?)));
+        own.or_else(|| {
+            let of_class = |key| Some((key, self.defaults?.get(key)?.as_str()));
+            TURNS.into_iter().find_map(of_class)
+        })
+    }
+
+    /// Returns the first number of an attribute; `None` if there is none, and after it has reported
+    /// a fault.
+    pub(super) fn number(&self, name: &str, reader: &mut Reader) -> Option<f64> {
+        let numbers = reader.list(self.node, name, self.get(name)?)?;
+        numbers.first().copied()
     }
 }
 
@@ -161,13 +191,6 @@ pub(super) struct Item<'a> {
     pub(super) class: Option<&'a str>,
     /// The end of its name: the number of its copy.
     pub(super) suffix: String,
-}
-
-/// The elements in a body, and the number of those that were visited.
-#[derive(Default)]
-struct Content<'a> {
-    items: Vec<Item<'a>>,
-    n_visited: usize,
 }
 
 impl Item<'_> {
@@ -192,6 +215,7 @@ impl Compiler {
             models: BTreeMap::new(),
             paired: BTreeSet::new(),
             masses: MassRules::default(),
+            limits_itself: true,
             fits_boxes: false,
         };
         if root.tag_name().name() != "mujoco" {
@@ -233,13 +257,28 @@ impl Compiler {
     }
 
     fn read_settings(&mut self, settings: Node, folders: &mut Folders, reader: &mut Reader) {
+        for (key, words) in KEYWORDS {
+            let Some(word) = settings.attribute(key).filter(|word| !words.contains(word)) else {
+                continue;
+            };
+            let message = format!("`{key}` can't be `{word}`");
+            let help = format!("write one of these words: {}", words.join(", "));
+            reader.error("W034", settings, message, help);
+        }
         match settings.attribute("angle") {
             Some("radian") => self.angle = 1.0,
             Some("degree") => self.angle = 1f64.to_radians(),
             _ => {}
         }
         if let Some(sequence) = settings.attribute("eulerseq") {
-            sequence.clone_into(&mut self.euler);
+            let is_axis = |letter: char| "xyzXYZ".contains(letter);
+            if sequence.chars().count() == 3 && sequence.chars().all(is_axis) {
+                sequence.clone_into(&mut self.euler);
+            } else {
+                let message = format!("`eulerseq` can't be `{sequence}`");
+                let help = "write three letters of x, y, z, X, Y and Z";
+                reader.error("W034", settings, message, help);
+            }
         }
         let written = settings
             .attribute("meshdir")
@@ -249,6 +288,9 @@ impl Compiler {
         }
         if let Some(strips) = settings.attribute("strippath") {
             folders.strips = strips == "true";
+        }
+        if let Some(limits) = settings.attribute("autolimits") {
+            self.limits_itself = limits != "false";
         }
         self.fits_boxes |= settings.attribute("fitaabb") == Some("true");
         if settings.attribute("coordinate") == Some("global") {
@@ -272,9 +314,9 @@ impl Compiler {
                 .numbers::<1>(settings, written, bound)
                 .map(|[number]| number)
         };
-        masses.least[0] = number("boundmass", Bound::NotNegative).unwrap_or(masses.least[0]);
-        masses.least[1] = number("boundinertia", Bound::NotNegative).unwrap_or(masses.least[1]);
-        let total = number("settotalmass", Bound::Finite);
+        masses.least[0] = number("boundmass", Bound::Mass).unwrap_or(masses.least[0]);
+        masses.least[1] = number("boundinertia", Bound::Mass).unwrap_or(masses.least[1]);
+        let total = number("settotalmass", Bound::Within);
         masses.total_kg = total.filter(|kg| *kg > 0.0).or(masses.total_kg);
         if let Some(written) = settings.attribute("inertiagrouprange") {
             let groups = reader.numbers(settings, written, Bound::Finite);
@@ -290,19 +332,17 @@ impl Compiler {
             return;
         };
         let numbers = |key: &str| attributes.get(key);
-        let scale = numbers("scale").and_then(|text| reader.numbers(node, text, Bound::Finite));
+        let scale = numbers("scale").and_then(|text| reader.numbers(node, text, Bound::Within));
         let position =
-            numbers("refpos").and_then(|text| reader.numbers::<3>(node, text, Bound::Finite));
-        let turn = numbers("refquat")
-            .and_then(|text| reader.numbers::<4>(node, text, Bound::Finite))
-            .and_then(|[w, x, y, z]| UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-9));
+            numbers("refpos").and_then(|text| reader.numbers::<3>(node, text, Bound::Within));
+        let turn = numbers("refquat").and_then(|text| quaternion(node, text, reader));
         let mut mesh = MeshAsset {
             scale: scale.unwrap_or([1.0; 3]),
             origin: Isometry3::from_parts(
                 Translation3::from(Vector3::from(position.unwrap_or_default())),
                 turn.unwrap_or_default(),
             ),
-            is_shell: attributes.get("inertia") == Some("shell"),
+            spread: spread(node, &attributes, reader),
             ..MeshAsset::default()
         };
         if file.is_none() {
@@ -318,7 +358,7 @@ impl Compiler {
             }
         }
         mesh.file = file;
-        self.meshes.insert(name, mesh);
+        self.meshes.insert(name, Rc::new(mesh));
     }
 
     fn add_model(&mut self, node: Node, reader: &mut Reader) {
@@ -379,6 +419,10 @@ impl Compiler {
             let values = own
                 .entry(kind(element.tag_name().name()).to_owned())
                 .or_default();
+            // One rotation replaces another one.
+            if TURNS.iter().any(|key| element.has_attribute(*key)) {
+                values.retain(|key, _| !TURNS.contains(&key.as_str()));
+            }
             values.extend(
                 element
                     .attributes()
@@ -408,11 +452,13 @@ impl Compiler {
         }
     }
 
-    /// Returns the elements in a body: its own, and those of its `<frame>`s and `<replicate>`s.
+    /// Returns the elements in a body: its own, and those of its `<frame>`s and `<replicate>`s; not
+    /// all of them if the budget is spent.
     pub(super) fn content<'a>(
         &self,
         body: Node<'a>,
         class: Option<&'a str>,
+        budget: &Budget,
         reader: &mut Reader,
     ) -> Vec<Item<'a>> {
         let whole = Item {
@@ -421,19 +467,20 @@ impl Compiler {
             class,
             suffix: String::new(),
         };
-        let mut found = Content::default();
-        self.add_content(&whole, &mut found, reader);
-        if found.n_visited > MOST_ITEMS {
-            let message = format!("this element has more than {MOST_ITEMS} others and copies");
-            reader.error("W055", body, message, "use fewer copies");
-        }
-        found.items
+        let mut found = Vec::new();
+        self.add_content((&whole, 0), &mut found, budget, reader);
+        found
     }
 
-    fn add_content<'a>(&self, of: &Item<'a>, found: &mut Content<'a>, reader: &mut Reader) {
+    fn add_content<'a>(
+        &self,
+        (of, depth): (&Item<'a>, usize),
+        found: &mut Vec<Item<'a>>,
+        budget: &Budget,
+        reader: &mut Reader,
+    ) {
         for node in of.node.children().filter(Node::is_element) {
-            found.n_visited += 1;
-            if found.n_visited > MOST_ITEMS {
+            if !budget.element(depth, node, reader) {
                 return;
             }
             let inside = |shift: Isometry3<f64>, suffix: String| Item {
@@ -446,7 +493,7 @@ impl Compiler {
                 "frame" => {
                     let pose = self.pose(&self.attributes(node, of.class), node, reader);
                     let frame = inside(of.shift * pose, of.suffix.clone());
-                    self.add_content(&frame, found, reader);
+                    self.add_content((&frame, depth + 1), found, budget, reader);
                 }
                 "replicate" => {
                     let Some((count, step)) = self.copies(node, reader) else {
@@ -456,16 +503,16 @@ impl Compiler {
                     let separator = node.attribute("sep").unwrap_or_default();
                     let mut shift = of.shift;
                     for number in 0..count {
-                        found.n_visited += 1;
-                        if found.n_visited > MOST_ITEMS {
+                        if !budget.element(depth, node, reader) {
                             return;
                         }
                         let suffix = format!("{separator}{number:0digits$}{}", of.suffix);
-                        self.add_content(&inside(shift, suffix), found, reader);
+                        let copy = inside(shift, suffix);
+                        self.add_content((&copy, depth + 1), found, budget, reader);
                         shift *= step;
                     }
                 }
-                _ => found.items.push(Item {
+                _ => found.push(Item {
                     node,
                     shift: of.shift,
                     class: of.class,
@@ -486,7 +533,7 @@ impl Compiler {
             return None;
         };
         let mut three = |key: &str| match node.attribute(key) {
-            Some(text) => reader.numbers::<3>(node, text, Bound::Finite),
+            Some(text) => reader.numbers::<3>(node, text, Bound::Within),
             None => Some([0.0; 3]),
         };
         let (offset, euler) = (three("offset")?, three("euler")?);
@@ -495,6 +542,54 @@ impl Compiler {
             self.turned(euler),
         );
         Some((count, step))
+    }
+
+    /// Returns the two ends of a range of an element, unless it is switched off: without a word
+    /// about it, an empty range is none. Returns `None` after it has reported a fault, too.
+    pub(super) fn limits(
+        &self,
+        node: Node,
+        attributes: &MjcfAttributes<'_>,
+        [range, limited]: [&str; 2],
+        reader: &mut Reader,
+    ) -> Option<[f64; 2]> {
+        let written = attributes.get(range);
+        let ends = match written {
+            Some(text) => reader.numbers::<2>(node, text, Bound::Finite)?,
+            None => [0.0; 2],
+        };
+        let is_range = ends[0] < ends[1];
+        match attributes.get(limited) {
+            Some("false") => None,
+            Some("true") => {
+                if !is_range {
+                    let message = format!("`{limited}` is true, but `{range}` is no range");
+                    let help = "write two numbers, the smaller one first";
+                    reader.error("W034", node, message, help);
+                }
+                is_range.then_some(ends)
+            }
+            None | Some("auto") => {
+                if ends[0] > ends[1] {
+                    let message = format!(
+                        "`{range}` has a lower limit of {} above its upper limit of {}",
+                        ends[0], ends[1]
+                    );
+                    reader.error("W034", node, message, "write the smaller number first");
+                } else if is_range && !self.limits_itself {
+                    let message = format!("`{range}` has no effect without `{limited}`");
+                    let help =
+                        format!("write `{limited}=\"true\"`, or remove `autolimits=\"false\"`");
+                    reader.error("W034", node, message, help);
+                }
+                is_range.then_some(ends)
+            }
+            Some(other) => {
+                let message = format!("`{limited}` can't be `{other}`");
+                reader.error("W034", node, message, "write `true`, `false` or `auto`");
+                None
+            }
+        }
     }
 
     /// Returns the pose of an element; the identity after it has reported a fault.
@@ -506,7 +601,7 @@ impl Compiler {
     ) -> Isometry3<f64> {
         let at = attributes
             .get("pos")
-            .and_then(|text| reader.numbers::<3>(node, text, Bound::Finite));
+            .and_then(|text| reader.numbers::<3>(node, text, Bound::Within));
         let at = Translation3::from(Vector3::from(at.unwrap_or([0.0; 3])));
         Isometry3::from_parts(
             at,
@@ -514,37 +609,85 @@ impl Compiler {
         )
     }
 
+    /// Returns a rotation. Any other attribute than `quat` decides before it, even if it is that of
+    /// the class. Returns `None` if there is none, and after it has reported a fault.
     fn rotation(
         &self,
         attributes: &MjcfAttributes<'_>,
         node: Node,
         reader: &mut Reader,
     ) -> Option<UnitQuaternion<f64>> {
-        if let Some(text) = attributes.get("quat") {
-            let [w, x, y, z] = reader.numbers(node, text, Bound::Finite)?;
-            return UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-9);
+        let is_own = |key: &&str| node.has_attribute(*key);
+        if std::iter::once("quat").chain(TURNS).filter(is_own).count() > 1 {
+            let message = "this element states its orientation twice".to_owned();
+            let help = "write one of `quat`, `axisangle`, `euler`, `xyaxes` and `zaxis`";
+            reader.error("W034", node, message, help);
+            return None;
         }
-        if let Some(text) = attributes.get("axisangle") {
-            let [x, y, z, angle] = reader.numbers(node, text, Bound::Finite)?;
-            let axis = Unit::try_new(Vector3::new(x, y, z), 1e-9)?;
-            return Some(UnitQuaternion::from_axis_angle(&axis, angle * self.angle));
+        let Some((key, text)) = attributes.turn() else {
+            return quaternion(node, attributes.get("quat")?, reader);
+        };
+        let found = match key {
+            "axisangle" => {
+                let [x, y, z, angle] = reader.numbers(node, text, Bound::Finite)?;
+                let axis = Unit::try_new(Vector3::new(x, y, z), 1e-9);
+                axis.map(|axis| UnitQuaternion::from_axis_angle(&axis, angle * self.angle))
+            }
+            "euler" => Some(self.turned(reader.numbers(node, text, Bound::Finite)?)),
+            "xyaxes" => {
+                let [a, b, c, d, e, f] = reader.numbers(node, text, Bound::Finite)?;
+                of_axes(Vector3::new(a, b, c), Vector3::new(d, e, f))
+            }
+            _ => {
+                let axis = reader.numbers::<3>(node, text, Bound::Finite)?;
+                let axis = Vector3::from(axis).try_normalize(1e-9);
+                axis.map(|axis| upright_to(&axis))
+            }
+        };
+        if found.is_none() {
+            let message = format!("`{key}` must not be zero, and its axes must differ");
+            reader.error("W034", node, message, "leave it out, or state another axis");
         }
-        if let Some(text) = attributes.get("euler") {
-            let angles: [f64; 3] = reader.numbers(node, text, Bound::Finite)?;
-            return Some(self.turned(angles));
+        found
+    }
+
+    /// Returns the pose between the two points of `fromto`, whose axis z points from the second to
+    /// the first, and half of their distance; `None` without `fromto`, and after it has reported a
+    /// fault.
+    pub(super) fn between(
+        &self,
+        attributes: &MjcfAttributes<'_>,
+        node: Node,
+        reader: &mut Reader,
+    ) -> Option<(Isometry3<f64>, f64)> {
+        let text = attributes.get("fromto")?;
+        if !LONG.contains(&attributes.get("type").unwrap_or("sphere")) {
+            let message =
+                "`fromto` belongs to capsules, cylinders, boxes and ellipsoids".to_owned();
+            reader.error("W034", node, message, "state the `type` of the shape");
+            return None;
         }
-        if let Some(text) = attributes.get("xyaxes") {
-            let [a, b, c, d, e, f] = reader.numbers(node, text, Bound::Finite)?;
-            let x = Vector3::new(a, b, c).try_normalize(1e-9)?;
-            let y = Vector3::new(d, e, f);
-            let y = (y - x * x.dot(&y)).try_normalize(1e-9)?;
-            let axes = Matrix3::from_columns(&[x, y, x.cross(&y)]);
-            return Some(UnitQuaternion::from_rotation_matrix(
-                &Rotation3::from_matrix_unchecked(axes),
-            ));
+        let [ax, ay, az, bx, by, bz] = reader.numbers(node, text, Bound::Within)?;
+        let (a, b) = (Point3::new(ax, ay, az), Point3::new(bx, by, bz));
+        let middle = Translation3::from(nalgebra::center(&a, &b).coords);
+        let turned = upright_to(&(a - b));
+        Some((Isometry3::from_parts(middle, turned), (b - a).norm() / 2.0))
+    }
+
+    /// Returns the pose of a site: as that of a geom, it may follow from two points.
+    pub(super) fn site(
+        &self,
+        attributes: &MjcfAttributes<'_>,
+        node: Node,
+        reader: &mut Reader,
+    ) -> Isometry3<f64> {
+        match attributes.get("fromto") {
+            Some(_) => {
+                let between = self.between(attributes, node, reader);
+                between.map(|(pose, _)| pose).unwrap_or_default()
+            }
+            None => self.pose(attributes, node, reader),
         }
-        let [x, y, z] = reader.numbers(node, attributes.get("zaxis")?, Bound::Finite)?;
-        UnitQuaternion::rotation_between(&Vector3::z(), &Vector3::new(x, y, z))
     }
 
     /// Rotations about the axes of the file's sequence: lower-case ones turn with the body,
@@ -568,6 +711,50 @@ impl Compiler {
     }
 }
 
+/// How the mass of a mesh is spread, by its `inertia`.
+fn spread(node: Node, attributes: &MjcfAttributes<'_>, reader: &mut Reader) -> Spread {
+    match attributes.get("inertia") {
+        None | Some("legacy") => Spread::Inside,
+        Some("exact") => Spread::Exact,
+        Some("convex") => Spread::Hull,
+        Some("shell") => Spread::Shell,
+        Some(other) => {
+            let message = format!("`inertia` can't be `{other}`");
+            let help = "write `convex`, `exact`, `legacy` or `shell`";
+            reader.error("W034", node, message, help);
+            Spread::Inside
+        }
+    }
+}
+
+/// Reads a quaternion. Returns `None` after it has reported a fault.
+fn quaternion(node: Node, text: &str, reader: &mut Reader) -> Option<UnitQuaternion<f64>> {
+    let [w, x, y, z] = reader.numbers(node, text, Bound::Finite)?;
+    let found = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-9);
+    if found.is_none() {
+        let message = "a quaternion must not be zero".to_owned();
+        reader.error("W034", node, message, "write `1 0 0 0` for no rotation");
+    }
+    found
+}
+
+/// The rotation whose axis x is the first, and whose axis y is as near to the second as can be.
+fn of_axes(x: Vector3<f64>, y: Vector3<f64>) -> Option<UnitQuaternion<f64>> {
+    let x = x.try_normalize(1e-9)?;
+    let y = (y - x * x.dot(&y)).try_normalize(1e-9)?;
+    let axes = Matrix3::from_columns(&[x, y, x.cross(&y)]);
+    Some(UnitQuaternion::from_rotation_matrix(
+        &Rotation3::from_matrix_unchecked(axes),
+    ))
+}
+
+/// The shortest rotation of the axis z to another one; downwards, that about x.
+fn upright_to(axis: &Vector3<f64>) -> UnitQuaternion<f64> {
+    UnitQuaternion::rotation_between(&Vector3::z(), axis).unwrap_or_else(|| {
+        UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
+    })
+}
+
 /// The folders of a file's meshes.
 #[derive(Default)]
 struct Folders {
@@ -580,6 +767,9 @@ impl Folders {
     fn path(&self, file: &str) -> String {
         let last = file.rsplit(['/', '\\']).next().unwrap_or(file);
         let file = if self.strips { last } else { file };
+        if is_absolute(file) {
+            return file.to_owned();
+        }
         format!("{}{file}", self.meshes)
     }
 }
@@ -620,6 +810,12 @@ fn state_gains(kind: &str, values: &mut Values) {
     ] {
         values.insert(key.to_owned(), value);
     }
+}
+
+/// Whether a path or URI has a folder of its own, on this machine or another one.
+pub(super) fn is_absolute(path: &str) -> bool {
+    let has_drive = path.as_bytes().get(1) == Some(&b':');
+    path.starts_with(['/', '\\']) || has_drive || path.contains("://")
 }
 
 /// The name of a file without its folders and its ending.
@@ -663,17 +859,19 @@ pub(super) struct Whole {
 /// first file, or to the one that includes it.
 ///
 /// # Errors
-/// Faults of XML (W031, W055), a file that can't be read (W035).
+/// Faults of XML (W031), too many or too long files (W055), a file that can't be read (W035).
 pub(super) fn with_includes(
     source: &Source,
     path: &Path,
     files: &Files,
+    budget: &Budget,
 ) -> Result<Whole, Diagnostics> {
     let mut whole = Splice {
         text: String::new(),
         pieces: Vec::new(),
         main: path.parent().unwrap_or(Path::new("")),
         files,
+        budget,
     };
     whole.add(source, path, 0)?;
     Ok(Whole {
@@ -689,19 +887,18 @@ struct Splice<'a> {
     /// Folder of the first file.
     main: &'a Path,
     files: &'a Files,
+    budget: &'a Budget,
 }
 
 impl Splice<'_> {
     /// Adds a text; if it is included at a depth, only the elements below its root.
     fn add(&mut self, source: &Source, path: &Path, depth: usize) -> Result<(), Diagnostics> {
-        let document = xml::parse_model(source, &source.text)?;
-        if self.text.len() + source.text.len() > xml::LONGEST_MODEL {
-            let message = "with all files that it includes, this model is too long";
-            return Err(Diagnostic::error("W055", message)
+        self.budget.file(source.text.len()).map_err(|message| {
+            Diagnostic::error("W055", message)
                 .at(source, 0..0)
                 .help("include fewer files, each once")
-                .into());
-        }
+        })?;
+        let document = xml::parse_model(source, &source.text)?;
         let root = document.root_element();
         let range = match (depth, root.first_child(), root.last_child()) {
             (0, ..) => 0..source.text.len(),

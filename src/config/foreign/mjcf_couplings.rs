@@ -4,10 +4,40 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::foreign::mjcf_compiler::{Compiler, MjcfAttributes};
 use crate::foreign::mjcf_loops::{self, BodyTree};
-use crate::foreign::xml::{self, Bound, Node, Reader};
+use crate::foreign::xml::{self, Node, Reader};
+use actcheck_base::{Diagnostic, SourceSpan};
 
 /// A joint that another one follows, with the factor and the offset of the coupling.
 pub(super) type Mimic = (String, f64, f64);
+
+/// A joint that an element names.
+#[derive(Debug, Clone)]
+pub(super) struct NamedJoint {
+    pub(super) name: String,
+    place: SourceSpan,
+    /// What the element does with it, and how it names it.
+    role: &'static str,
+    key: &'static str,
+}
+
+impl NamedJoint {
+    fn new(name: &str, element: Node, [role, key]: [&'static str; 2], reader: &Reader) -> Self {
+        Self {
+            name: name.to_owned(),
+            place: reader.place(element),
+            role,
+            key,
+        }
+    }
+
+    /// The fault that there is no such joint.
+    pub(super) fn unknown(&self) -> Diagnostic {
+        let message = format!("there is no movable joint `{}` to {}", self.name, self.role);
+        Diagnostic::error("W051", message)
+            .at(&self.place.source, xml::tag(&self.place))
+            .help(self.key)
+    }
+}
 
 /// Couplings and motors of a file, by names of joints.
 #[derive(Debug, Clone, Default)]
@@ -21,6 +51,8 @@ pub(super) struct Couplings {
     /// Positions where the file's bodies are as it places them, of the joints for which these are
     /// not 0.
     pub(super) starts: BTreeMap<String, f64>,
+    /// The joints that elements name, with the places of these.
+    pub(super) named: Vec<NamedJoint>,
     /// Joints with an actuator. `None` if the file has no actuators, and none are known.
     pub(super) actuated: Option<BTreeSet<String>>,
 }
@@ -38,7 +70,7 @@ impl Couplings {
             let message = format!("`<{name}>` can't be simulated: bodies are rigid here");
             reader.error("W035", soft, message, "leave it out");
         }
-        let tendons = tendons(root);
+        let tendons = tendons(root, reader);
         let tree = BodyTree::read(root, compiler, reader);
         let mut found = Self {
             starts: tree.starts(),
@@ -46,7 +78,7 @@ impl Couplings {
         };
         found.add_actuators(root, compiler, &tendons, reader);
         found.add_equalities_of_joints(root, reader);
-        found.add_equalities_of_tendons(root, &tendons, &tree);
+        found.add_equalities_of_tendons(root, (&tendons, &tree), reader);
         let loops = mjcf_loops::couplings(root, compiler, (tree, &found), reader);
         found.mimics.extend(loops);
         found
@@ -85,10 +117,18 @@ impl Couplings {
                 .into_iter()
                 .chain(by_tendon.into_iter().flatten())
                 .collect();
+            let role = [
+                "drive",
+                "an actuator names a joint, and a tendon those that it pulls",
+            ];
+            let named = moved
+                .iter()
+                .map(|(joint, _)| NamedJoint::new(joint, actuator, role, reader));
+            self.named.extend(named);
             self.actuated
                 .get_or_insert_default()
                 .extend(moved.iter().map(|(joint, _)| joint.clone()));
-            if let Some(range) = servo_range(actuator, &attributes, reader) {
+            if let Some(range) = servo_range(actuator, &attributes, compiler, reader) {
                 // A tendon is as long as the sum of its joints, which move alike.
                 let sum: f64 = moved.iter().map(|(_, share)| share.abs()).sum();
                 let ends = range.map(|end| end / sum);
@@ -105,10 +145,11 @@ impl Couplings {
                     .map(|(joint, share)| (joint.clone(), range_of(*share)));
                 self.ranges.extend(ranges);
             }
-            let Some([lower, upper]) = force_range(actuator, &attributes, reader) else {
+            let Some([lower, upper]) = force_range(actuator, &attributes, compiler, reader) else {
                 continue;
             };
-            let most = f64::max(-lower, upper) * attributes.number("gear").unwrap_or(1.0).abs();
+            let most =
+                f64::max(-lower, upper) * attributes.number("gear", reader).unwrap_or(1.0).abs();
             for (joint, share) in moved {
                 let effort = most * share.abs();
                 let known = self.efforts.entry(joint).or_insert(effort);
@@ -119,30 +160,35 @@ impl Couplings {
 
     fn add_equalities_of_joints(&mut self, root: Node, reader: &mut Reader) {
         for joint in elements(root, "equality").filter(|equality| equality.has_tag_name("joint")) {
-            let (Some(follower), Some(leader)) =
-                (joint.attribute("joint1"), joint.attribute("joint2"))
-            else {
-                continue;
-            };
-            let mut known = root
-                .descendants()
-                .filter(|node| node.has_tag_name("joint"))
-                .filter_map(|node| node.attribute("name"));
-            if !known.any(|name| name == leader) {
-                let message = format!("there is no movable joint `{leader}` to mimic");
-                reader.error(
-                    "W051",
-                    joint,
-                    message,
-                    "`joint2` names the joint that `joint1` follows",
-                );
+            if joint.attribute("active") == Some("false") {
                 continue;
             }
+            let Some(follower) = reader.attribute(joint, "joint1") else {
+                continue;
+            };
+            let Some(leader) = joint.attribute("joint2") else {
+                let message =
+                    format!("an equality that holds `{follower}` in place can't be simulated");
+                let help = "remove the joint, or name the joint that it follows in `joint2`";
+                reader.error("W035", joint, message, help);
+                continue;
+            };
+            for (name, role) in [
+                (
+                    leader,
+                    ["mimic", "`joint2` names the joint that `joint1` follows"],
+                ),
+                (
+                    follower,
+                    ["couple", "`joint1` names the joint that follows `joint2`"],
+                ),
+            ] {
+                self.named.push(NamedJoint::new(name, joint, role, reader));
+            }
             let written = joint.attribute("polycoef").unwrap_or("0 1 0 0 0");
-            let numbers: Vec<f64> = written
-                .split_whitespace()
-                .filter_map(|word| word.parse().ok())
-                .collect();
+            let Some(numbers) = reader.list(joint, "polycoef", written) else {
+                continue;
+            };
             let (offset, factor) = (
                 numbers.first().copied().unwrap_or(0.0),
                 numbers.get(1).copied().unwrap_or(1.0),
@@ -158,10 +204,16 @@ impl Couplings {
 
     /// Couples the two joints of each fixed tendon whose length an equality fixes: the joint
     /// without an actuator follows, of two such joints the one that follows no other yet.
-    fn add_equalities_of_tendons(&mut self, root: Node, tendons: &Tendons, tree: &BodyTree) {
-        for equality in
-            elements(root, "equality").filter(|equality| equality.has_tag_name("tendon"))
-        {
+    fn add_equalities_of_tendons(
+        &mut self,
+        root: Node,
+        (tendons, tree): (&Tendons, &BodyTree),
+        reader: &mut Reader,
+    ) {
+        let equalities = elements(root, "equality").filter(|node| {
+            node.has_tag_name("tendon") && node.attribute("active") != Some("false")
+        });
+        for equality in equalities {
             let tendon = equality
                 .attribute("tendon1")
                 .filter(|_| equality.attribute("tendon2").is_none());
@@ -181,7 +233,7 @@ impl Couplings {
             }
             let longer = equality
                 .attribute("polycoef")
-                .and_then(|text| text.split_whitespace().next()?.parse().ok());
+                .and_then(|text| reader.list(equality, "polycoef", text)?.first().copied());
             let factor = -leader.1 / follower.1;
             let [of_leader, of_follower] = [leader, follower].map(|(joint, _)| tree.range(joint));
             let as_placed = longer.unwrap_or(0.0) / follower.1 + self.start(&follower.0)
@@ -212,26 +264,24 @@ impl Couplings {
 fn force_range(
     actuator: Node,
     attributes: &MjcfAttributes<'_>,
+    compiler: &Compiler,
     reader: &mut Reader,
 ) -> Option<[f64; 2]> {
-    let mut limits = |key: &str, limited: &str| {
-        let written = attributes
-            .get(key)
-            .filter(|_| attributes.get(limited) != Some("false"))?;
-        reader.numbers::<2>(actuator, written, Bound::Finite)
-    };
-    let of_force = limits("forcerange", "forcelimited");
+    let keys = ["forcerange", "forcelimited"];
+    let of_force = compiler.limits(actuator, attributes, keys, reader);
     let is = |key: &str, usual: &str| attributes.get(key).unwrap_or(usual) == usual;
     // The force of a motor, and of other actuators without a bias, is the signal times the gain.
     let gain = match actuator.tag_name().name() {
         "motor" => Some(1.0),
         "general" if is("gaintype", "fixed") && is("biastype", "none") => {
-            Some(attributes.number("gainprm").unwrap_or(1.0))
+            Some(attributes.number("gainprm", reader).unwrap_or(1.0))
         }
         _ => None,
     };
     let of_signal = gain.and_then(|gain| {
-        let [a, b] = limits("ctrlrange", "ctrllimited")?.map(|end| end * gain);
+        let keys = ["ctrlrange", "ctrllimited"];
+        let ends = compiler.limits(actuator, attributes, keys, reader)?;
+        let [a, b] = ends.map(|end| end * gain);
         Some([a.min(b), a.max(b)])
     });
     match (of_force, of_signal) {
@@ -245,15 +295,12 @@ fn force_range(
 fn servo_range(
     actuator: Node,
     attributes: &MjcfAttributes<'_>,
+    compiler: &Compiler,
     reader: &mut Reader,
 ) -> Option<[f64; 2]> {
-    let first = |name: &str, place: usize| {
-        attributes
-            .get(name)?
-            .split_whitespace()
-            .nth(place)?
-            .parse::<f64>()
-            .ok()
+    let mut first = |name: &str, place: usize| {
+        let numbers = reader.list(actuator, name, attributes.get(name)?)?;
+        numbers.get(place).copied()
     };
     let ratio = match actuator.tag_name().name() {
         "position" => 1.0,
@@ -262,8 +309,11 @@ fn servo_range(
         }
         _ => return None,
     };
-    let ends = reader.numbers::<2>(actuator, attributes.get("ctrlrange")?, Bound::Finite)?;
-    let range = ends.map(|end| end * ratio / first("gear", 0).unwrap_or(1.0));
+    let gear = first("gear", 0).unwrap_or(1.0);
+    let ends = compiler.limits(actuator, attributes, ["ctrlrange", "ctrllimited"], reader)?;
+    let [a, b] = ends.map(|end| end * ratio / gear);
+    // A negative gear turns the range.
+    let range = [a.min(b), a.max(b)];
     (range[0] < range[1] && range.iter().all(|end| end.is_finite())).then_some(range)
 }
 
@@ -290,19 +340,19 @@ struct Tendon {
 
 type Tendons = BTreeMap<String, Tendon>;
 
-fn tendons(root: Node) -> Tendons {
-    let read = |tendon: Node| {
-        let number = |node: Node, name: &str| {
-            node.attribute(name)?
-                .split_whitespace()
-                .next()?
-                .parse::<f64>()
-                .ok()
+fn tendons(root: Node, reader: &mut Reader) -> Tendons {
+    let mut read = |tendon: Node| {
+        let mut number = |node: Node, name: &str| {
+            reader
+                .list(node, name, node.attribute(name)?)?
+                .first()
+                .copied()
         };
+        let stiffness = number(tendon, "stiffness");
+        let spring = number(tendon, "springlength")
+            .filter(|length| stiffness.is_some_and(|stiffness| stiffness > 0.0) && *length >= 0.0);
         let joint =
             |joint: Node| Some((joint.attribute("joint")?.to_owned(), number(joint, "coef")?));
-        let is_sprung = number(tendon, "stiffness").is_some_and(|stiffness| stiffness > 0.0);
-        let spring = number(tendon, "springlength").filter(|length| is_sprung && *length >= 0.0);
         Tendon {
             joints: xml::children(tendon, "joint").filter_map(joint).collect(),
             spring,

@@ -1,18 +1,17 @@
 //! Geoms of bodies in MJCF, with their shapes, masses and friction.
 
-use std::f64::consts::PI;
 use std::rc::Rc;
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3};
 
 use crate::foreign::geom_mass::equivalent_box;
 use crate::foreign::geometry::Shapes;
 use crate::foreign::hull::convex_hull;
 use crate::foreign::mjcf::Model;
-use crate::foreign::mjcf_compiler::{Item, MeshAsset, MjcfAttributes};
-use crate::foreign::mjcf_masks::collides;
-use crate::foreign::xml::{Bound, Node, Reader};
-use actcheck_data::{Matter, Mesh, Shape, TreeGeometry, TreeSolid};
+use crate::foreign::mjcf_compiler::{Compiler, Item, MeshAsset, MjcfAttributes};
+use crate::foreign::mjcf_masks::{Mask, collides};
+use crate::foreign::xml::{Bound, LONGEST, Node, Reader};
+use actcheck_data::{Amount, Matter, Mesh, Shape, Spread, TreeGeometry, TreeSolid};
 
 /// Density of geoms: MuJoCo's default. Unit: kg/m³.
 const DENSITY: f64 = 1000.0;
@@ -55,6 +54,7 @@ impl<'a> Model<'a> {
     ) -> Option<TreeSolid> {
         let geom = item.node;
         let is_solid = collides(attributes, &self.compiler);
+        Mask::check(geom, attributes, reader);
         let kind = match attributes.get("type") {
             Some(kind) => kind,
             None if attributes.get("mesh").is_some() => "mesh",
@@ -63,6 +63,12 @@ impl<'a> Model<'a> {
         let shift = own * item.shift;
         let pose = shift * self.compiler.pose(attributes, geom, reader);
         let (geometry, moved) = match kind {
+            "hfield" | "sdf" if is_solid && (kind == "sdf" || !self.is_robot()) => {
+                let message = format!("a geom of the type {kind} can't be simulated");
+                let help = "replace it by a mesh, or by boxes";
+                reader.error("W035", geom, message, help);
+                return None;
+            }
             "plane" | "hfield" | "sdf" => {
                 if is_solid {
                     let message = format!("the geom of the type {kind} is left out");
@@ -76,7 +82,7 @@ impl<'a> Model<'a> {
                 (self.mesh(name, geom, reader)?, None)
             }
             _ if attributes.get("mesh").is_some() => self.fitted(kind, geom, attributes, reader)?,
-            _ => primitive(kind, geom, attributes, reader)?,
+            _ => primitive(kind, geom, attributes, &self.compiler, reader)?,
         };
         Some(TreeSolid {
             // A geom between two points has its pose from these.
@@ -87,9 +93,10 @@ impl<'a> Model<'a> {
             },
             geometry,
             matter: self.matter(geom, attributes, reader),
+            // MuJoCo takes a negative one for 0.
             friction: attributes
-                .number("friction")
-                .filter(|number| *number >= 0.0),
+                .number("friction", reader)
+                .map(|sliding| sliding.max(0.0)),
             place: reader.place(geom),
         })
     }
@@ -102,32 +109,37 @@ impl<'a> Model<'a> {
         reader: &mut Reader,
     ) -> Option<Matter> {
         let [first, last] = self.compiler.masses.groups;
-        let group = attributes.number("group").unwrap_or(0.0);
+        let group = match attributes.get("group") {
+            Some(text) => reader.numbers::<1>(geom, text, Bound::Finite)?[0],
+            None => 0.0,
+        };
         if group < first || group > last {
             return None;
         }
         let mesh = attributes
             .get("mesh")
             .and_then(|name| self.compiler.meshes.get(name));
-        let is_shell = attributes.get("shellinertia") == Some("true")
-            || mesh.is_some_and(|mesh| mesh.is_shell);
-        if is_shell && attributes.get("type") == Some("ellipsoid") {
+        let spread = match (attributes.get("shellinertia"), mesh) {
+            (Some("true"), _) => Spread::Shell,
+            (_, Some(mesh)) => mesh.spread,
+            (_, None) => Spread::Inside,
+        };
+        if spread == Spread::Shell && attributes.get("type") == Some("ellipsoid") {
             let message = "the inertia of a hollow ellipsoid is not read".to_owned();
             reader.error("W035", geom, message, "give its body an `<inertial>`");
             return None;
         }
-        let mut number = |key: &str| {
+        let mut number = |key: &str, bound: Bound| {
             let written = attributes.get(key)?;
             reader
-                .numbers::<1>(geom, written, Bound::NotNegative)
+                .numbers::<1>(geom, written, bound)
                 .map(|[number]| number)
         };
-        Some(match (number("mass"), is_shell) {
-            (Some(kg), false) => Matter::Mass(kg),
-            (Some(kg), true) => Matter::ShellMass(kg),
-            (None, false) => Matter::Density(number("density").unwrap_or(DENSITY)),
-            (None, true) => Matter::Shell(number("density").unwrap_or(DENSITY)),
-        })
+        let amount = match number("mass", Bound::Mass) {
+            Some(kg) => Amount::Mass(kg),
+            None => Amount::Density(number("density", Bound::Mass).unwrap_or(DENSITY)),
+        };
+        Some(Matter { amount, spread })
     }
 
     /// Returns a mesh of `<asset>`. Returns `None` after it has reported a fault.
@@ -140,9 +152,9 @@ impl<'a> Model<'a> {
                 scale: asset.scale,
             }),
             _ => {
-                let mesh = self.vertices(&asset, geom, reader)?;
                 let file = format!("<mesh name=\"{name}\">");
-                self.keep_mesh(&file, mesh);
+                let mesh = self.own_mesh(name, &asset, geom, reader)?;
+                self.keep_mesh(&file, &mesh);
                 Some(TreeGeometry::Mesh {
                     file,
                     scale: [1.0; 3],
@@ -151,7 +163,25 @@ impl<'a> Model<'a> {
         }
     }
 
-    fn asset(&self, name: &str, geom: Node, reader: &mut Reader) -> Option<MeshAsset> {
+    /// Returns a mesh in its own frame and at its own scale, which is computed once for all geoms.
+    /// Returns `None` after it has reported a fault.
+    fn own_mesh(
+        &self,
+        name: &str,
+        asset: &MeshAsset,
+        geom: Node,
+        reader: &mut Reader,
+    ) -> Option<Rc<Mesh>> {
+        if let Some(known) = self.meshes.borrow().get(name) {
+            return known.clone();
+        }
+        let mesh = self.vertices(asset, geom, reader).map(Rc::new);
+        let mut known = self.meshes.borrow_mut();
+        known.insert(name.to_owned(), mesh.clone());
+        mesh
+    }
+
+    fn asset(&self, name: &str, geom: Node, reader: &mut Reader) -> Option<Rc<MeshAsset>> {
         let found = self.compiler.meshes.get(name).cloned();
         if found.is_none() {
             let message = format!("there is no mesh `{name}` in `<asset>`");
@@ -187,7 +217,11 @@ impl<'a> Model<'a> {
                 match Mesh::new(asset.vertices.clone(), triangles) {
                     Ok(mesh) => mesh,
                     Err(fault) => {
-                        let help = "give it at least four vertices that are not in one plane";
+                        let help = if asset.triangles.is_empty() {
+                            "give it at least four vertices that are not in one plane"
+                        } else {
+                            "each number in `face` is the place of a vertex, from 0 on"
+                        };
                         reader.error("W037", geom, fault.to_string(), help);
                         return None;
                     }
@@ -199,7 +233,15 @@ impl<'a> Model<'a> {
         let moved = |vertex: &[f64; 3]| (inverse * Point3::from(*vertex)).coords.into();
         let vertices = mesh.vertices.iter().map(moved).collect();
         let moved = Mesh::new(vertices, mesh.triangles).ok()?;
-        Some(moved.scaled(asset.scale))
+        let scaled = moved.scaled(asset.scale);
+        let is_near = |along: &f64| along.abs() <= LONGEST;
+        if !scaled.vertices.iter().flatten().all(is_near) {
+            let message = format!("the mesh reaches beyond {LONGEST} m from its origin");
+            let help = "lengths are in metres: write `scale` 0.001 for millimetres";
+            reader.error("W034", geom, message, help);
+            return None;
+        }
+        Some(scaled)
     }
 
     /// Returns a primitive that is fitted to a mesh: the one with the same moments of inertia.
@@ -219,13 +261,16 @@ impl<'a> Model<'a> {
             reader.error("W035", geom, message.to_owned(), help);
             return None;
         }
-        let mesh = self.vertices(&asset, geom, reader)?;
+        let mesh = self.own_mesh(name, &asset, geom, reader)?;
         let Some((pose, half)) = equivalent_box(&mesh) else {
             let message = format!("the mesh `{name}` has no volume to fit a primitive to");
             reader.error("W037", geom, message, "name a closed mesh");
             return None;
         };
-        let scale = attributes.number("fitscale").unwrap_or(1.0);
+        let scale = match attributes.get("fitscale") {
+            Some(text) => reader.numbers::<1>(geom, text, Bound::Length)?[0],
+            None => 1.0,
+        };
         let [x, y, z] = half.map(|half| half * scale);
         let radius = (x + y) / 2.0;
         let geometry = match kind {
@@ -255,24 +300,20 @@ fn primitive(
     kind: &str,
     geom: Node,
     attributes: &MjcfAttributes<'_>,
+    compiler: &Compiler,
     reader: &mut Reader,
 ) -> Option<Placed> {
-    let size: Vec<f64> = attributes
-        .get("size")
-        .unwrap_or_default()
-        .split_whitespace()
-        .filter_map(|word| word.parse().ok())
-        .collect();
-    let ends = match attributes.get("fromto") {
-        Some(text) if kind != "sphere" => Some(reader.numbers::<6>(geom, text, Bound::Finite)?),
-        _ => None,
+    let size: Vec<f64> = reader.list(geom, "size", attributes.get("size").unwrap_or_default())?;
+    let between = match attributes.get("fromto") {
+        Some(_) => Some(compiler.between(attributes, geom, reader)?),
+        None => None,
     };
-    let wanted = match (kind, ends) {
+    let wanted = match (kind, between) {
         ("sphere", _) | (_, Some(_)) => 1,
         ("cylinder" | "capsule", None) => 2,
         _ => 3,
     };
-    let is_possible = |number: &f64| number.is_finite() && *number > 0.0;
+    let is_possible = |number: &f64| *number > 0.0 && *number <= LONGEST;
     if size.len() < wanted || !size[..wanted].iter().all(is_possible) {
         let message =
             format!("a geom of the type {kind} needs {wanted} positive numbers in `size`");
@@ -280,7 +321,6 @@ fn primitive(
         reader.error("W034", geom, message, help);
         return None;
     }
-    let between = ends.map(between);
     let [x, y, z] = match (&between, wanted) {
         // Between its ends, a geom is as wide as it is deep.
         (Some((_, half)), _) => [size[0], size[0], *half],
@@ -304,13 +344,4 @@ fn primitive(
         },
     };
     Some((geometry, between.map(|(pose, _)| pose)))
-}
-
-/// The pose of a geom between two points, and half of their distance.
-fn between([ax, ay, az, bx, by, bz]: [f64; 6]) -> (Isometry3<f64>, f64) {
-    let (a, b) = (Point3::new(ax, ay, az), Point3::new(bx, by, bz));
-    let turned = UnitQuaternion::rotation_between(&Vector3::z(), &(b - a))
-        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI));
-    let middle = Translation3::from(nalgebra::center(&a, &b).coords);
-    (Isometry3::from_parts(middle, turned), (b - a).norm() / 2.0)
 }

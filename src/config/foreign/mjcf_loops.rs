@@ -9,6 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 
+use crate::foreign::mjcf_budget::Budget;
 use crate::foreign::mjcf_compiler::{Compiler, Item};
 use crate::foreign::mjcf_couplings::{Couplings, Mimic, elements, not_linear};
 use crate::foreign::xml::{self, Bound, Node, Reader};
@@ -50,6 +51,13 @@ struct MjcfBody {
     hinges: Vec<usize>,
 }
 
+/// What the bodies of a file are read with.
+struct Walk<'a, 'r> {
+    compiler: &'a Compiler,
+    budget: &'a Budget,
+    reader: &'a mut Reader<'r>,
+}
+
 /// Two points that coincide, each in the frame of its body; a body that is `None` is the world.
 struct Closure<'a> {
     node: Node<'a>,
@@ -81,12 +89,22 @@ pub(super) fn couplings(
     }
     let follows = |hinge: &usize| known.mimics.contains_key(&tree.hinges[*hinge].name);
     let is_passive = |hinge: &usize| !follows(hinge) && known.is_passive(&tree.hinges[*hinge].name);
-    let closures =
-        elements(root, "equality").filter_map(|node| tree.closure(node, compiler, reader));
-    let closures: Vec<Closure<'_>> = closures
-        .filter(|closure| !closure.hinges.is_empty())
-        .take(MOST_LOOPS)
-        .collect();
+    let loops = elements(root, "equality")
+        .filter(|node| node.has_tag_name("connect") && node.attribute("active") != Some("false"));
+    let mut closures = Vec::new();
+    for node in loops.take(MOST_LOOPS) {
+        match tree.closure(node, compiler, reader) {
+            Some(closure) if closure.hinges.is_empty() => {}
+            Some(closure) => closures.push(closure),
+            None => {
+                let message =
+                    "this loop of links is left open: it names no body or site of this file";
+                let help = "its links then stay where the file puts them; bodies of attached models \
+                            can't be connected here";
+                reader.warning("W036", node, message.to_owned(), help);
+            }
+        }
+    }
     for group in together(closures, is_passive) {
         let hinges: BTreeSet<usize> = group
             .iter()
@@ -210,9 +228,15 @@ impl BodyTree {
     pub(super) fn read(root: Node, compiler: &Compiler, reader: &Reader) -> Self {
         let mut tree = Self::default();
         let mut unheard = Reader::new(reader.source);
+        let budget = Budget::default();
+        let mut walk = Walk {
+            compiler,
+            budget: &budget,
+            reader: &mut unheard,
+        };
         for worldbody in xml::children(root, "worldbody") {
             let class = worldbody.attribute("childclass");
-            tree.add((worldbody, None, ""), class, (compiler, &mut unheard));
+            tree.add((worldbody, None, ""), class, &mut walk);
         }
         tree
     }
@@ -241,9 +265,10 @@ impl BodyTree {
         &mut self,
         (node, body, suffix): (Node, Option<usize>, &str),
         class: Option<&str>,
-        (compiler, reader): (&Compiler, &mut Reader),
+        walk: &mut Walk<'_, '_>,
     ) {
-        let content = compiler.content(node, class, reader);
+        let compiler = walk.compiler;
+        let content = compiler.content(node, class, walk.budget, walk.reader);
         let items: Vec<Item<'_>> = content
             .into_iter()
             .map(|item| Item {
@@ -253,7 +278,7 @@ impl BodyTree {
             .collect();
         for item in items.iter().filter(|item| item.is("site")) {
             let attributes = compiler.attributes(item.node, item.class);
-            let at = item.shift * compiler.pose(&attributes, item.node, reader);
+            let at = item.shift * compiler.site(&attributes, item.node, walk.reader);
             if let Some(name) = item.name() {
                 self.sites.insert(name, (body, at * Point3::origin()));
             }
@@ -262,14 +287,18 @@ impl BodyTree {
             let name = format!("{}{suffix}", node.attribute("name").unwrap_or("body"));
             let first = self.hinges.len();
             for item in items.iter().filter(|item| item.is("joint")) {
-                self.hinges.extend(hinge(item, &name, (compiler, reader)));
+                self.hinges
+                    .extend(hinge(item, &name, (compiler, walk.reader)));
             }
             self.bodies[body].hinges = (first..self.hinges.len()).collect();
             self.names.insert(name, body);
         }
         for item in items.iter().filter(|item| item.is("body")) {
+            if !walk.budget.enter(item.node, walk.reader) {
+                return;
+            }
             let attributes = compiler.attributes(item.node, item.class);
-            let pose = item.shift * compiler.pose(&attributes, item.node, reader);
+            let pose = item.shift * compiler.pose(&attributes, item.node, walk.reader);
             self.bodies.push(MjcfBody {
                 parent: body,
                 pose,
@@ -277,21 +306,18 @@ impl BodyTree {
             });
             let inside = (item.node, Some(self.bodies.len() - 1), item.suffix.as_str());
             let class = item.node.attribute("childclass").or(item.class);
-            self.add(inside, class, (compiler, reader));
+            self.add(inside, class, walk);
+            walk.budget.leave();
         }
     }
 
-    /// The points that a `<connect>` puts together. Returns `None` for other elements and those
-    /// that name no known body.
+    /// The points that a `<connect>` puts together. Returns `None` if it names no known body.
     fn closure<'a>(
         &self,
         node: Node<'a>,
         compiler: &Compiler,
         reader: &mut Reader,
     ) -> Option<Closure<'a>> {
-        if !node.has_tag_name("connect") || node.attribute("active") == Some("false") {
-            return None;
-        }
         let attributes = compiler.attributes(node, None);
         let body = |name: &str| {
             if name == "world" {
@@ -383,9 +409,7 @@ fn hinge(
         numbers("axis").unwrap_or([0.0, 0.0, 1.0]),
         numbers("pos").unwrap_or([0.0; 3]),
     );
-    let range = attributes
-        .get("range")
-        .and_then(|text| reader.numbers::<2>(joint, text, Bound::Finite));
+    let range = compiler.limits(joint, &attributes, ["range", "limited"], reader);
     let number = |name: &str| {
         attributes
             .get(name)
@@ -398,9 +422,7 @@ fn hinge(
         axis: Unit::try_new(item.shift.rotation * Vector3::from(axis), 1e-9)?,
         at: (item.shift * Point3::from(at)).coords,
         slides,
-        range: range
-            .filter(|_| attributes.get("limited") != Some("false"))
-            .map(|ends| ends.map(|end| end * unit)),
+        range: range.map(|ends| ends.map(|end| end * unit)),
         start: number("ref") * unit,
         stiffness: number("stiffness").max(0.0),
         rest: number("springref") * unit,

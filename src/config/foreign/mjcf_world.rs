@@ -7,10 +7,11 @@ use std::rc::Rc;
 use nalgebra::Isometry3;
 
 use crate::foreign::lookup::Lookup;
-use crate::foreign::mjcf::{Model, Purpose, unique, with_model};
+use crate::foreign::mjcf::{File, Model, Purpose, unique, with_model};
+use crate::foreign::mjcf_budget::Budget;
 use crate::foreign::xml::{self, Node, Reader};
 use actcheck_base::{Diagnostics, Source};
-use actcheck_data::{ModelTree, TreeLink};
+use actcheck_data::{ModelTree, TreeJoint, TreeLink, TreeMotion};
 
 /// A body, or a solid without a body, at the top of a world.
 pub(crate) struct Piece {
@@ -24,14 +25,15 @@ pub(crate) struct Piece {
 /// included files, and warnings.
 ///
 /// # Errors
-/// Faults of the text: W031 to W036, W051, W055.
+/// Faults of the text: W031 to W037, W051, W055.
 pub(crate) fn read(
     source: &Source,
     path: &Path,
     lookup: &Lookup,
 ) -> Result<(Vec<Piece>, Source, Diagnostics), Diagnostics> {
-    let purpose = (Purpose::Object, 0);
-    with_model(source, path, lookup, purpose, |root, model, reader| {
+    let budget = Budget::default();
+    let file = File::first(path, lookup, &budget);
+    with_model(source, file, Purpose::World, |root, model, reader| {
         let mut names = BTreeMap::new();
         let worlds = xml::children(root, "worldbody");
         worlds
@@ -54,28 +56,42 @@ fn pieces(
     };
     let mut found = Vec::new();
     let compiler = Rc::clone(&model.compiler);
-    for item in compiler.content(worldbody, worldbody.attribute("childclass"), reader) {
+    for item in compiler.content(
+        worldbody,
+        worldbody.attribute("childclass"),
+        model.file.budget,
+        reader,
+    ) {
         let mut own = model.alone();
         let world = own.unique("world");
         own.link(TreeLink::frame(world.clone(), reader.place(item.node)));
-        let (name, moves) = if item.is("geom") {
+        let name = if item.is("geom") {
             let at = Isometry3::identity();
             let [solids, _] = own.geoms(std::slice::from_ref(&item), &at, reader);
             if solids.is_empty() {
                 continue;
             }
             own.tree.links[0].solids = solids;
-            (named(item.name(), "solid"), false)
-        } else if item.is("body") {
-            let free = |joint: &Node| {
-                joint.has_tag_name("freejoint") || joint.attribute("type") == Some("free")
-            };
-            let moves = item.node.children().any(|child| free(&child));
-            own.body(&item, &world, &item.shift, reader);
-            (named(item.name(), "body"), moves)
+            named(item.name(), "solid")
         } else {
-            continue;
+            let at = Isometry3::identity();
+            own.children(std::slice::from_ref(&item), &world, &at, reader);
+            let name = if item.is("attach") {
+                item.node.attribute("body").or(item.node.attribute("model"))
+            } else {
+                None
+            };
+            let prefix = item.node.attribute("prefix").unwrap_or_default();
+            let attached = name.map(|name| format!("{prefix}{name}{}", item.suffix));
+            match item.node.tag_name().name() {
+                "body" => named(item.name(), "body"),
+                "attach" => named(attached, "body"),
+                // Sites, cameras and lights, and what has been refused.
+                _ => continue,
+            }
         };
+        let is_free = |joint: &TreeJoint| joint.motion == TreeMotion::Floating;
+        let moves = own.tree.joints.iter().any(is_free);
         own.weigh(reader);
         own.tree.name.clone_from(&name);
         found.push(Piece {

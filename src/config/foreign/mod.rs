@@ -21,11 +21,15 @@ pub(crate) mod lenient;
 mod lookup;
 mod mesh_file;
 pub(crate) mod mjcf;
+mod mjcf_budget;
 mod mjcf_compiler;
 mod mjcf_couplings;
+mod mjcf_elements;
 mod mjcf_geoms;
 mod mjcf_loops;
 mod mjcf_masks;
+#[cfg(test)]
+mod mjcf_tests;
 mod mjcf_world;
 mod nested;
 pub(crate) mod robot;

@@ -588,7 +588,7 @@ impl WorldReader<'_> {
 
     fn warn_if_movable(&mut self, is_still: bool, name: &str, node: Node) {
         if !is_still {
-            let message = format!("`{name}` can move in Gazebo, but is static in a world here");
+            let message = format!("`{name}` can move in its file, but is static in a world here");
             let help = "put movable objects into `[surfaceObjects]` or `nav_obstacle_list`";
             self.reader.warning("W036", node, message, help);
         }

@@ -29,6 +29,8 @@ pub(crate) enum Bound {
     Positive,
     /// A length of a body: as [`Bound::Positive`], but see [`LONGEST`].
     Length,
+    /// A position, or a moment of inertia: either sign, and as [`Bound::Positive`].
+    Within,
     /// A mass that may be missing: 0 or as [`Bound::Positive`].
     Mass,
 }
@@ -47,6 +49,7 @@ impl Bound {
                 Self::Finite => true,
                 Self::NotNegative => number >= 0.0,
                 Self::Positive | Self::Length => number > 0.0 && number <= LARGEST,
+                Self::Within => number.abs() <= LARGEST,
                 Self::Mass => (0.0..=LARGEST).contains(&number),
             }
     }
@@ -56,6 +59,7 @@ impl Bound {
             Self::Finite => "finite",
             Self::NotNegative => "at least 0",
             Self::Positive | Self::Length => "above 0 and at most 1000000",
+            Self::Within => "between -1000000 and 1000000",
             Self::Mass => "at least 0 and at most 1000000",
         }
     }
@@ -384,6 +388,24 @@ impl<'a> Reader<'a> {
             "units are metres, kilograms and radians",
         );
         None
+    }
+
+    /// Parses the numbers of an attribute, of which there may be any number; reports W034 and returns
+    /// `None` if one of them is no finite number.
+    pub(crate) fn list(&mut self, node: Node, name: &str, text: &str) -> Option<Vec<f64>> {
+        let words = text.split_whitespace();
+        let numbers: Option<Vec<f64>> = words
+            .map(|word| word.parse().ok().filter(|number: &f64| number.is_finite()))
+            .collect();
+        if numbers.is_none() {
+            let message = format!(
+                "`{name}` must contain numbers, but this is `{}`",
+                short(text)
+            );
+            let help = "separate numbers by spaces, and write them like 0.25";
+            self.error("W034", node, message, help);
+        }
+        numbers
     }
 
     /// Parses one number from an element's text; reports W034 and returns `None` if it is invalid.
