@@ -9,7 +9,7 @@ use actcheck_data::{
     ActionEnd, ActionReport, ActionTrace, Budget, Choices, ContactEpisode, Extremes, Form, Frames,
     RobotCourse, SceneMap, Snapshot, Trace,
 };
-use actcheck_world::{Playback, World};
+use actcheck_world::{Playback, World, keep_playback};
 
 /// Performs the actions in order with the reference skills.
 ///
@@ -60,7 +60,7 @@ pub fn perform_with(
 ) -> Trace {
     world.localise(choices);
     if interference.playback.is_some() {
-        world.keep_playback();
+        keep_playback(world);
     }
     let mut snapshots = vec![world.snapshot()];
     let mut memory = Memory::default();
@@ -118,7 +118,7 @@ pub fn perform_with(
         }
     }
     if let Some(playback) = interference.playback {
-        *playback = world.take_playback();
+        *playback = world.recorder().playback().cloned();
     }
     let tracks = world.recorder().tracks();
     let frames = Frames {

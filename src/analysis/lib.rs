@@ -6,6 +6,7 @@
 
 mod answer;
 mod bisect;
+mod calibrate;
 mod compare;
 mod consistency;
 mod coverage;
@@ -29,6 +30,7 @@ mod tables;
 
 pub use answer::Answer;
 pub use bisect::{Likeness, OutcomeFlip, like_by_outcomes, like_by_rates, outcome_flips};
+pub use calibrate::{Calibration, FittedLimit, LabelledRun, calibrate};
 pub use compare::{
     Compared, ComparedLine, ComparedRun, ComparedRuns, Comparison, compare, compared_runs,
 };

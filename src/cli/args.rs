@@ -291,6 +291,15 @@ pub enum Command {
         after_help = "Example:\n  actcheck cross-check k7f3 --runs 100 --python venv/bin/python    (with: pip install mujoco mcap)"
     )]
     CrossCheck(crate::cross_check::CrossCheckArgs),
+    /// Compare verdicts with people's labels: agreement, limits that fit better, likely wrong labels
+    ///
+    /// For each property with labels: how often its verdict agrees, and whether another limit in its
+    /// rule would agree more often. A limit is fitted to one half of the labels, and proposed only if
+    /// the other half confirms it. Labels that contradict a sure verdict come first.
+    ///
+    /// Exit code: 0 all labels agree, 1 some do not, 2 the labels could not be read.
+    #[command(after_help = "Example:\n  actcheck calibrate labels.csv    (run,property,label)")]
+    Calibrate(crate::calibrate::CalibrateArgs),
     /// Export a stored run as a case, or the history as tables or RDF, or send it to a SPARQL store
     #[command(
         after_help = "Examples:\n  actcheck export run k7f3-3 -o case.toml    (a run id from `actcheck list`; a prefix is enough)\n  actcheck export tables columns    (after `actcheck run configs/pick.toml`)\n  actcheck export rdf history.nq\n  actcheck export store http://localhost:3030/history/update    (another store, such as Fuseki)"

@@ -57,6 +57,7 @@ pub fn run(sources_digest: &'static str) -> ExitCode {
         Command::Compare(args) => crate::compare::compare(&args),
         Command::Bisect(args) => crate::bisect::bisect(&args),
         Command::CheckEpisodes(args) => crate::check_episodes::check_episodes(&args),
+        Command::Calibrate(args) => crate::calibrate::calibrate(&args),
         Command::CrossCheck(args) => crate::cross_check::cross_check(&args),
         Command::CheckOracles(args) => check_oracles::check_oracles(&args),
         Command::Explain(args) => explain::explain(&args).map(|()| 0),

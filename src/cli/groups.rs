@@ -41,6 +41,7 @@ const GROUPS: [Group; 2] = [
             "import",
             "check-episodes",
             "cross-check",
+            "calibrate",
             "export",
             "check-oracles",
             "datalog",

@@ -9,6 +9,7 @@ mod analyse;
 mod args;
 mod audit;
 mod bisect;
+mod calibrate;
 mod case;
 mod check;
 mod check_episodes;

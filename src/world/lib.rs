@@ -68,7 +68,7 @@ pub use reach::Shortcuts;
 pub use recorder::{Contact, Course, Record, Recorder, Tracks};
 pub use sense::Sighting;
 pub use settle::Settling;
-pub use simulation::{World, build, build_with};
+pub use simulation::{World, build, build_with, keep_playback};
 pub use suction::would_seal;
 
 pub use actcheck_geometry::{

@@ -323,9 +323,10 @@ impl Recorder {
         self.playback = Some(Playback::begin(engine));
     }
 
-    /// Returns the playback since its start; `None` without it.
-    pub(super) fn take_playback(&mut self) -> Option<Playback> {
-        self.playback.take()
+    /// Returns the robot's part of the run since [`keep_playback`](crate::keep_playback), for
+    /// another engine; `None` if it is not kept.
+    pub fn playback(&self) -> Option<&Playback> {
+        self.playback.as_ref()
     }
 
     /// Stores a command, which is part of the record.

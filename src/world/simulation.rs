@@ -19,7 +19,6 @@ use crate::forms::forms;
 use crate::observe::snapshot;
 use crate::overlaps::{Overlap, overlaps};
 use crate::perturbation;
-use crate::playback::Playback;
 use crate::proximity::Proximity;
 use crate::reach::Shortcuts;
 use crate::recorder::{Record, Recorder};
@@ -65,6 +64,11 @@ pub fn build_with(scene: &Scene, robot: &Robot) -> Result<World, WorldError> {
         drive: Drive::of(scene),
         proximity: Proximity::with(shortcuts),
     })
+}
+
+/// Starts a playback for another engine at the present state: see [`Recorder::playback`].
+pub fn keep_playback(world: &mut World) {
+    world.recorder.keep_playback(&world.engine);
 }
 
 impl World {
@@ -175,17 +179,6 @@ impl World {
     /// seconds.
     pub fn watch(&mut self, clock_secs: fn() -> f64) {
         self.engine.start_watch(clock_secs);
-    }
-
-    /// Starts a playback for another engine at the present state. It ends with
-    /// [`World::take_playback`].
-    pub fn keep_playback(&mut self) {
-        self.recorder.keep_playback(&self.engine);
-    }
-
-    /// Returns the playback since [`World::keep_playback`]; `None` without it.
-    pub fn take_playback(&mut self) -> Option<Playback> {
-        self.recorder.take_playback()
     }
 
     /// Returns the robot's current measurements.

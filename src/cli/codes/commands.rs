@@ -454,4 +454,10 @@ const CODES_X: &[Code] = &[
         "an environment variable is missing or malformed",
         "set ACTCHECK_SPARQL_USER and ACTCHECK_SPARQL_PASSWORD, or ACTCHECK_SPARQL_TOKEN alone",
     ),
+    code(
+        "X097",
+        "labels can't be read",
+        "the file is no CSV file with the columns run, property and label, or it names a run or a property that the history lacks",
+        "correct the line that the message names; labels are pass or fail",
+    ),
 ];

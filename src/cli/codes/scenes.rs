@@ -161,6 +161,18 @@ const CODES_S: &[Code] = &[
         "make a new run with `actcheck run`",
     ),
     code(
+        "S053",
+        "a run can't be written as a model for MuJoCo",
+        "its robot holds things by a suction cup, whose seal MuJoCo does not have",
+        "export runs of robots with fingers",
+    ),
+    code(
+        "S054",
+        "a campaign can't be cross-checked",
+        "it was imported: its simulator is elsewhere",
+        "name a campaign of `actcheck run`",
+    ),
+    code(
         "S060",
         "the scene of a case can't be built",
         "an edited value moved an object onto another one",

@@ -1,0 +1,436 @@
+//! `actcheck calibrate`
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use crate::options::{Format, HistoryArgs};
+use crate::{history_dir, output};
+use actcheck_analysis::{Calibration, FittedLimit, LabelledRun, calibrate as calibrate_labels};
+use actcheck_base::{Diagnostic, Diagnostics, Outcome, Source, did_you_mean, names};
+use actcheck_history::{History, Judgements, RunFilter, Wish};
+use actcheck_ontology as ontology;
+use actcheck_report::Table;
+use actcheck_verdict::wilson;
+
+/// Maximum number of contradicting labels of a property in the text.
+const MAX_LISTED: usize = 10;
+/// The columns of the file.
+const COLUMNS: [&str; 3] = ["run", "property", "label"];
+
+/// `actcheck calibrate`
+#[derive(Debug, Args)]
+pub struct CalibrateArgs {
+    /// The labels: a CSV file with the columns run, property and label (pass or fail)
+    pub labels: PathBuf,
+    /// The ontology whose rules have the limits [default: ontology/actions.ttl here, or the shipped
+    /// one]
+    #[arg(long, value_name = "FILE")]
+    pub ontology: Option<PathBuf>,
+    /// The folder of the history.
+    #[command(flatten)]
+    pub history: HistoryArgs,
+    /// How it is printed
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub format: Format,
+}
+
+/// A label, with its line in the file.
+struct Label {
+    run: String,
+    property: String,
+    passes: bool,
+    line: usize,
+}
+
+/// A property with its labels compared.
+struct Compared {
+    property: String,
+    found: Calibration,
+    /// The limit of its rule, if it has one: see [`Limit`].
+    limit: Option<Limit>,
+}
+
+/// The only number with which the `margin` rules of a property compare a value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Limit {
+    value: f64,
+    /// Whether the value must be below it.
+    is_upper: bool,
+}
+
+impl Limit {
+    /// The limit with which the property passes from another margin on.
+    fn moved(self, margin: f64) -> f64 {
+        if self.is_upper {
+            self.value - margin
+        } else {
+            self.value + margin
+        }
+    }
+}
+
+/// Compares outcomes with people's labels, and prints how well they agree. Returns the exit code.
+pub fn calibrate(args: &CalibrateArgs) -> Result<u8, Diagnostics> {
+    let labels = read(&args.labels)?;
+    let history = history_dir::open_to_read(&args.history)?;
+    let compared = compared(args, &history, labels)?;
+    output::print(&match args.format {
+        Format::Text => output::page().set(&text(&compared)),
+        Format::Csv => table(&compared).render(args.format.into(), output::page()),
+        Format::Json => format!("{:#}\n", json(&compared)),
+    });
+    let all_agree = compared
+        .iter()
+        .all(|one| one.found.agreeing == one.found.labels);
+    Ok(u8::from(!all_agree))
+}
+
+/// Reads the labels.
+fn read(path: &Path) -> Result<Vec<Label>, Diagnostics> {
+    let unreadable = |why: String| {
+        Diagnostic::error(
+            "X097",
+            format!("can't read the labels {}: {why}", path.display()),
+        )
+        .help(
+            "write a CSV file: `run,property,label`, then lines such as `k7f3-3,MovedObject,pass`",
+        )
+    };
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .comment(Some(b'#'))
+        .from_path(path)
+        .map_err(|error| unreadable(error.to_string()))?;
+    let head = reader
+        .headers()
+        .map_err(|error| unreadable(error.to_string()))?
+        .clone();
+    let column = |name: &str| {
+        head.iter()
+            .position(|own| own.trim_start_matches('\u{feff}') == name)
+    };
+    let [Some(run), Some(property), Some(label)] = COLUMNS.map(column) else {
+        let missing: Vec<&str> = COLUMNS
+            .into_iter()
+            .filter(|name| column(name).is_none())
+            .collect();
+        return Err(unreadable(format!("line 1 has no column {}", missing.join(", "))).into());
+    };
+    let mut faults = Diagnostics::new();
+    let mut labels = Vec::new();
+    for record in reader.records() {
+        let record = match record {
+            Ok(record) => record,
+            Err(error) => {
+                faults.push(unreadable(error.to_string()));
+                break;
+            }
+        };
+        let line = record
+            .position()
+            .map_or(0, |at| usize::try_from(at.line()).unwrap_or(0));
+        let of = |column: usize| record.get(column).unwrap_or_default().to_owned();
+        let passes = match of(label).to_lowercase().as_str() {
+            "pass" | "passed" | "true" | "yes" | "1" | "success" => true,
+            "fail" | "failed" | "false" | "no" | "0" | "failure" => false,
+            other => {
+                let message = format!("{}, line {line}: the label is `{other}`", path.display());
+                faults.push(Diagnostic::error("X097", message).help("write pass or fail"));
+                continue;
+            }
+        };
+        labels.push(Label {
+            run: of(run),
+            property: of(property),
+            passes,
+            line,
+        });
+    }
+    if labels.is_empty() && faults.is_empty() {
+        faults.push(unreadable("it has no labels".to_owned()));
+    }
+    faults.or(labels)
+}
+
+/// Finds the outcome of each label.
+fn compared(
+    args: &CalibrateArgs,
+    history: &History,
+    labels: Vec<Label>,
+) -> Result<Vec<Compared>, Diagnostics> {
+    // By run and property: whether it passed in all its actions, and its least margin.
+    let mut known: BTreeMap<String, BTreeMap<String, (bool, Option<f64>)>> = BTreeMap::new();
+    let wish = Wish {
+        judgements: Judgements::Newest,
+        ..Wish::default()
+    };
+    history.each_judged(&RunFilter::default(), wish, &mut |run| {
+        let own = known.entry(run.row.run.clone()).or_default();
+        for one in &run.outcomes {
+            let passed = match one.outcome {
+                Outcome::Passed => true,
+                Outcome::Failed => false,
+                _ => continue,
+            };
+            let found = own.entry(one.property.to_string()).or_insert((true, None));
+            found.0 &= passed;
+            found.1 = match (found.1, one.margin) {
+                (Some(one), Some(other)) => Some(one.min(other)),
+                (one, other) => one.or(other),
+            };
+        }
+    })?;
+    let mut faults = Diagnostics::new();
+    let mut runs: BTreeMap<String, Vec<LabelledRun>> = BTreeMap::new();
+    for label in labels {
+        let place = format!("{}, line {}", args.labels.display(), label.line);
+        let Some(of_run) = known.get(&label.run) else {
+            let help = did_you_mean(&label.run, known.keys().map(String::as_str));
+            let message = format!("{place}: the history has no run `{}`", label.run);
+            faults.push(Diagnostic::error("X097", message).help(help));
+            continue;
+        };
+        let found = of_run
+            .iter()
+            .find(|(iri, _)| **iri == label.property || names::local(iri) == label.property);
+        let Some((iri, (passed, margin))) = found else {
+            let help = did_you_mean(&label.property, of_run.keys().map(|iri| names::local(iri)));
+            let message = format!(
+                "{place}: `{}` was not decided in run {}",
+                label.property, label.run
+            );
+            faults.push(Diagnostic::error("X097", message).help(help));
+            continue;
+        };
+        runs.entry(iri.clone()).or_default().push(LabelledRun {
+            run: label.run,
+            passed: *passed,
+            margin: *margin,
+            label: label.passes,
+        });
+    }
+    let runs = faults.or(runs)?;
+    let limits = limits(args, runs.keys());
+    Ok(runs
+        .into_iter()
+        .map(|(iri, runs)| Compared {
+            found: calibrate_labels(&runs),
+            limit: limits.get(&iri).copied(),
+            property: names::local(&iri).to_owned(),
+        })
+        .collect())
+}
+
+/// The limits in the rules of properties. An ontology that can't be read has none: they are only
+/// for the words.
+fn limits<'a>(
+    args: &CalibrateArgs,
+    properties: impl Iterator<Item = &'a String>,
+) -> BTreeMap<String, Limit> {
+    let (files, path) = crate::why::ontology_file(args.ontology.as_deref());
+    let Ok(ontology) = ontology::load(&files, &path) else {
+        return BTreeMap::new();
+    };
+    let of = |iri: &String| {
+        let rule = &ontology.properties.get(iri)?.rule;
+        Some((iri.clone(), limit_of(&rule.source)?))
+    };
+    properties.filter_map(of).collect()
+}
+
+/// Returns the limit in the `margin` rules of a rule file, if all have the same one.
+fn limit_of(source: &Source) -> Option<Limit> {
+    let mut found: Option<Limit> = None;
+    let margins = source
+        .text
+        .lines()
+        .filter(|line| line.starts_with("margin("));
+    for line in margins {
+        let (_, formula) = line.rsplit_once("?m =")?;
+        let formula = formula.trim().trim_end_matches('.').trim();
+        let (left, right) = formula.split_once(" - ")?;
+        let number = |text: &str| text.trim().parse::<f64>().ok();
+        let own = match (number(left), number(right)) {
+            (Some(value), None) => Limit {
+                value,
+                is_upper: true,
+            },
+            (None, Some(value)) => Limit {
+                value,
+                is_upper: false,
+            },
+            _ => return None,
+        };
+        if found.is_some_and(|known| known != own) {
+            return None;
+        }
+        found = Some(own);
+    }
+    found
+}
+
+/// How a fitted limit differs from the present one, in words.
+fn proposal(one: &Compared, fitted: &FittedLimit) -> String {
+    let figures = format!(
+        "agreement with the {} labels that it was not fitted to: {} instead of {} (p = {:.4})",
+        fitted.held_out, fitted.confirmed[1], fitted.confirmed[0], fitted.test.second_worse
+    );
+    match one.limit {
+        Some(limit) => format!(
+            "{}: the limit {:.4} fits the labels better than {}; {figures}",
+            one.property,
+            limit.moved(fitted.margin),
+            limit.value
+        ),
+        None => format!(
+            "{}: the labels fit better if it passes from a margin of {:+.4} on; {figures}",
+            one.property, fitted.margin
+        ),
+    }
+}
+
+fn text(compared: &[Compared]) -> String {
+    let mut out = table(compared).render(Format::Text.into(), output::page());
+    for one in compared {
+        if let Some(fitted) = &one.found.fitted {
+            out += &format!("\n{}\n", proposal(one, fitted));
+        }
+        if one.found.contradicting.is_empty() {
+            continue;
+        }
+        out += &format!(
+            "\n{}: {} labels contradict the verdict; those of the surest verdicts first, which are the likeliest wrong labels\n",
+            one.property,
+            one.found.contradicting.len()
+        );
+        for run in one.found.contradicting.iter().take(MAX_LISTED) {
+            let margin = run
+                .margin
+                .map_or_else(String::new, |margin| format!(", margin {margin:+.4}"));
+            out += &format!("  {}: labelled {}{margin}\n", run.run, word(run.label));
+        }
+        let more = one.found.contradicting.len().saturating_sub(MAX_LISTED);
+        if more > 0 {
+            out += &format!("  and {more} more: `--format json` has all\n");
+        }
+    }
+    out
+}
+
+fn word(passes: bool) -> &'static str {
+    if passes { "pass" } else { "fail" }
+}
+
+fn table(compared: &[Compared]) -> Table {
+    let mut table = Table::new([
+        "property",
+        "labels",
+        "agree",
+        "interval",
+        "passes_only_by_rules",
+        "passes_only_by_labels",
+        "limit",
+        "fitted_limit",
+    ]);
+    for one in compared {
+        let found = &one.found;
+        let interval = wilson(found.agreeing, found.labels).map_or_else(String::new, |interval| {
+            format!(
+                "{:.0} to {:.0} %",
+                100.0 * interval.low,
+                100.0 * interval.high
+            )
+        });
+        let fitted = found.fitted.as_ref().zip(one.limit);
+        table.rows.push(vec![
+            json!(one.property),
+            json!(found.labels),
+            json!(found.agreeing),
+            json!(interval),
+            json!(found.only_rules),
+            json!(found.only_labels),
+            json!(one.limit.map(|limit| limit.value)),
+            json!(fitted.map(|(fitted, limit)| rounded(limit.moved(fitted.margin)))),
+        ]);
+    }
+    table
+}
+
+/// A limit in four decimals, as texts have it.
+fn rounded(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4
+}
+
+fn json(compared: &[Compared]) -> Value {
+    let one = |one: &Compared| {
+        let fitted = one.found.fitted.map(|fitted| {
+            json!({
+                "margin": fitted.margin,
+                "limit": one.limit.map(|limit| limit.moved(fitted.margin)),
+                "fitted_to": fitted.fitted_to,
+                "fitted": fitted.fitted,
+                "held_out": fitted.held_out,
+                "confirmed": fitted.confirmed,
+                "p": fitted.test.second_worse,
+            })
+        });
+        let contradicting: Vec<Value> = one
+            .found
+            .contradicting
+            .iter()
+            .map(|run| json!({ "run": run.run, "label": word(run.label), "margin": run.margin }))
+            .collect();
+        json!({
+            "property": one.property,
+            "labels": one.found.labels,
+            "agreeing": one.found.agreeing,
+            "passes_only_by_rules": one.found.only_rules,
+            "passes_only_by_labels": one.found.only_labels,
+            "limit": one.limit.map(|limit| limit.value),
+            "fitted": fitted,
+            "contradicting": contradicting,
+        })
+    };
+    json!(compared.iter().map(one).collect::<Vec<Value>>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_limit_of_a_rule_is_found() {
+        let of = |text: &str| limit_of(&Source::new("rule.rls", text));
+        assert_eq!(
+            of("margin(?m) :- clearance(_, ?d), ?m = 0.05 - ?d ."),
+            Some(Limit {
+                value: 0.05,
+                is_upper: true
+            })
+        );
+        let lower = "margin(?m) :- a(?d), ?m = ?d - 0.02 .\nmargin(?m) :- b(?d), ?m = ?d - 0.02 .";
+        assert_eq!(
+            of(lower),
+            Some(Limit {
+                value: 0.02,
+                is_upper: false
+            })
+        );
+        for without in [
+            "",
+            "margin(?m) :- a(?d), ?m = ?d .",
+            "margin(?m) :- a(?d), ?m = ?d - 1 .\nmargin(?m) :- b(?d), ?m = 2 - ?d .",
+        ] {
+            assert_eq!(of(without), None, "{without}");
+        }
+        let moved = Limit {
+            value: 0.05,
+            is_upper: true,
+        }
+        .moved(0.01);
+        assert!((moved - 0.04).abs() < 1e-12);
+    }
+}
