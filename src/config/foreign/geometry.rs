@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 use std::path::Path;
 
+use crate::foreign::inclusions::Inclusions;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::mesh_file;
 use crate::foreign::xml::{self, Bound, Node, Reader};
@@ -17,8 +18,8 @@ pub(crate) struct Shapes<'a> {
     pub(crate) path: &'a Path,
     /// Digest of the mesh files and of included models.
     pub(crate) digest: Digest,
-    /// Number of models that include this file's model.
-    pub(crate) depth: usize,
+    /// The models that include this file's model.
+    pub(crate) inclusions: Inclusions,
     /// Warnings about mesh files without a text, each of which is given once.
     pub(crate) warned: BTreeSet<String>,
 }
@@ -32,7 +33,7 @@ impl<'a> Shapes<'a> {
             lookup,
             path,
             digest: Digest::new(),
-            depth: 0,
+            inclusions: Inclusions::default(),
             warned: BTreeSet::new(),
         }
     }

@@ -7,9 +7,10 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use crate::foreign::assembly::{Assembly, Join};
 use crate::foreign::body::{Body, Role};
 use crate::foreign::elements::Children;
-use crate::foreign::folder;
+use crate::foreign::folder::{self, Including};
 use crate::foreign::frames::{Frame, Included, OWN};
 use crate::foreign::geometry::Shapes;
+use crate::foreign::inclusions::check_size;
 use crate::foreign::sdf::is_static;
 use crate::foreign::sdf_pose::{self, pose, prefix};
 use crate::foreign::sdf_surface::{
@@ -20,8 +21,6 @@ use crate::foreign::{sdf_joint, sdf_link};
 use actcheck_base::Span;
 use actcheck_data::PartJoint;
 
-/// Deepest inclusion of models: deeper ones include themselves.
-pub(super) const DEEPEST: usize = 8;
 /// Of the elements that are read, `allow_auto_disable`, `name` and `origin` have no effect.
 const MODEL: Children = Children {
     read: &[
@@ -231,7 +230,10 @@ impl Tree {
                 continue;
             };
             shapes.digest.update(model.digest.as_bytes());
-            if let Some(own) = pose(include.node, reader) {
+            let n_links = self.links.len() + model.tree.links.len();
+            if let Some(own) = pose(include.node, reader)
+                && check_size(n_links, include.node, reader).is_some()
+            {
                 let prefix = format!("{}{}", include.prefix, prefix(include.node, reader));
                 self.add(model.tree, &(include.model * own), &prefix, include.node);
             }
@@ -241,6 +243,9 @@ impl Tree {
     /// Adds a model at a pose. Its places in its own file become that of the `<include>`.
     fn add(&mut self, other: Self, at: &Isometry3<f64>, prefix: &str, include: Node) {
         let first = self.links.len();
+        if other.collides.is_some() && self.collides.is_none() {
+            self.collides = Some(xml::span(include));
+        }
         self.links.extend(other.links.into_iter().map(|mut link| {
             link.body.transform(at);
             link.body.fixed = self.fixed;
@@ -390,25 +395,52 @@ impl Tree {
         body
     }
 
-    /// Checks that joints connect all links of a model that can move (W035).
+    /// Checks that joints connect all links of a model that can move (W035): reports each group of
+    /// links that is apart from the first link. A single one without shapes and mass is left out
+    /// (W036).
     fn check_connected(&self, joins: &[Join], reader: &mut Reader) {
-        let mut reached = BTreeSet::from([0]);
-        let mut is_new = true;
-        while is_new {
-            is_new = false;
-            for join in joins {
-                if reached.contains(&join.parent) != reached.contains(&join.child) {
-                    reached.extend([join.parent, join.child]);
-                    is_new = true;
+        let mut reached = BTreeSet::new();
+        for start in 0..self.links.len() {
+            if !reached.insert(start) {
+                continue;
+            }
+            let mut open = vec![start];
+            let mut n_links = 0;
+            while let Some(link) = open.pop() {
+                n_links += 1;
+                for [from, to] in joins
+                    .iter()
+                    .flat_map(|join| [[join.parent, join.child], [join.child, join.parent]])
+                {
+                    if from == link && reached.insert(to) {
+                        open.push(to);
+                    }
                 }
             }
+            if start > 0 {
+                self.report_loose(start, n_links, reader);
+            }
         }
-        let loose = self.links.iter().enumerate();
-        if let Some((_, link)) = loose.into_iter().find(|(idx, _)| !reached.contains(idx)) {
-            let message = format!("no joint connects `{}` to the other links", link.name);
-            let help = "add a `<joint type=\"fixed\">`, or write `<static>true</static>`";
-            reader.error_at("W035", link.at.clone(), message, help);
+    }
+
+    /// Reports a group of links that is apart from the others, by its first link.
+    fn report_loose(&self, first: usize, n_links: usize, reader: &mut Reader) {
+        let link = &self.links[first];
+        let (name, at) = (&link.name, link.at.clone());
+        let body = &link.body;
+        if n_links == 1 && body.parts.is_empty() && body.masses.iter().all(|mass| mass.kg == 0.0) {
+            let message = format!("`{name}` is left out: no joint connects it to the other links");
+            let help = "it has no shape and no mass; a joint of the type `fixed` would hold it";
+            reader.warning_at("W036", at, message, help);
+            return;
         }
+        let others = match n_links {
+            1 => String::new(),
+            _ => format!(" and the {} links joined to it", n_links - 1),
+        };
+        let message = format!("no joint connects `{name}`{others} to the other links");
+        let help = "add a `<joint type=\"fixed\">`, or write `<static>true</static>`";
+        reader.error_at("W035", at, message, help);
     }
 }
 
@@ -515,14 +547,10 @@ impl<'a> Elements<'a> {
                 }
                 "gripper" if role == Role::Object => {
                     let message = "`<gripper>` inside a model is not supported".to_owned();
-                    let help = "leave it out; robots are read from URDF";
+                    let help = "leave it out; `[robot] profile` names robots";
                     reader.error("W035", child, message, help);
                 }
-                "plugin" => {
-                    let message = "the plugin is not run".to_owned();
-                    let help = "forces and motions by plugins are not simulated";
-                    reader.warning("W036", child, message, help);
-                }
+                "plugin" => warn_of_plugin(child, reader),
                 _ => {}
             }
         }
@@ -552,6 +580,13 @@ fn self_collision(model: Node, reader: &mut Reader) -> Option<Span> {
         .map(xml::span)
 }
 
+pub(super) fn warn_of_plugin(plugin: Node, reader: &mut Reader) {
+    let message = "the plugin is not run".to_owned();
+    let help = "forces and motions by plugins are not simulated";
+    reader.warning("W036", plugin, message, help);
+}
+
+/// Reports a static model inside one that can move (W035).
 pub(super) fn refuse_static(model: Node, reader: &mut Reader) {
     let message = "a static model inside one that can move can't be simulated".to_owned();
     let help = "remove its `<static>`, or make the whole model static";
@@ -567,18 +602,16 @@ fn include(
     shapes: &mut Shapes,
     reader: &mut Reader,
 ) -> Option<SubModel> {
-    check_include(include, reader);
+    check_include(include, |_| false, reader);
     let uri = reader.required(include, "uri")?;
-    if shapes.depth >= DEEPEST {
-        let message =
-            format!("models are included more than {DEEPEST} levels deep: one includes itself");
-        reader.error("W035", uri, message, "remove the `<include>`");
-        return None;
-    }
     let merged = reader.boolean_attribute(include, "merge")?;
-    let depth = shapes.depth + 1;
+    let file = Including {
+        path: shapes.path,
+        lookup: shapes.lookup,
+        inclusions: &shapes.inclusions,
+    };
     let known = std::iter::empty();
-    let mut model = folder::included(uri, shapes.lookup, (role, fixed), depth, known, reader)?;
+    let mut model = folder::included(uri, &file, (role, fixed), known, reader)?;
     // A merged model leaves `<static>` to the model that includes it.
     let is_static = match xml::child(include, "static") {
         Some(written) => reader.boolean(written)?,
@@ -593,9 +626,13 @@ fn include(
     Some(model)
 }
 
-/// Reports the elements of an `<include>` that are not read.
-pub(crate) fn check_include(include: Node, reader: &mut Reader) {
+/// Reports the elements of an `<include>` that are not read, other than those plugins which
+/// `is_read` accepts.
+pub(crate) fn check_include(include: Node, is_read: impl Fn(Node) -> bool, reader: &mut Reader) {
     INCLUDE.check(include, reader);
+    for plugin in xml::children(include, "plugin").filter(|plugin| !is_read(*plugin)) {
+        warn_of_plugin(plugin, reader);
+    }
     if let Some(params) = prefixed(include, "experimental", "params") {
         let message = "changes of an included model can't be read".to_owned();
         let help = "write the changed model to a folder of its own";

@@ -5,6 +5,7 @@ use std::path::Path;
 use crate::foreign::body::{Role, SdfModel};
 use crate::foreign::frames::Included;
 use crate::foreign::geometry::Shapes;
+use crate::foreign::inclusions::Inclusions;
 use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::nested::{SubModel, Tree};
@@ -41,17 +42,17 @@ pub(crate) fn read(
     })
 }
 
-/// Reads the model of an SDF file that `depth` others include, as its links, and its faults. It is
-/// `None` if there are errors.
+/// Reads the model of an SDF file that others include, as its links, and its faults. It is `None` if
+/// there are errors.
 pub(crate) fn read_included(
     source: &Source,
     path: &Path,
     lookup: &Lookup,
     (role, fixed): (Role, bool),
-    depth: usize,
+    inclusions: Inclusions,
 ) -> (Option<SubModel>, Diagnostics) {
     let shapes = Shapes {
-        depth,
+        inclusions,
         ..Shapes::new(lookup, path)
     };
     read_with(source, shapes, |model, shapes, reader| {

@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use nalgebra::Isometry3;
 
 use crate::foreign::elements::Children;
-use crate::foreign::nested::refuse_static;
+use crate::foreign::inclusions::check_size;
+use crate::foreign::nested::{refuse_static, warn_of_plugin};
 use crate::foreign::sdf::is_static;
 use crate::foreign::sdf_pose::{self, pose};
 use crate::foreign::sdf_robot_include::{SdfFile, Submodels};
@@ -48,8 +49,10 @@ pub(crate) struct LinkAt {
     pub(crate) collides: Option<bool>,
     /// Faults of shapes that are only seen.
     pub(crate) faults_of_visuals: Option<Diagnostics>,
-    /// Whether it has no `<inertial>`.
-    pub(crate) has_no_mass: bool,
+    /// Whether its file states no mass.
+    pub(crate) lacks_mass: bool,
+    /// Whether its file does not state all moments of inertia.
+    pub(crate) lacks_moments: bool,
 }
 
 /// An end of a joint.
@@ -251,11 +254,7 @@ impl<'a> RobotElements<'a> {
                 "plugin" if sdf_robot_joint::is_coupling(child) => {
                     self.couplings.push(written(child));
                 }
-                "plugin" => {
-                    let message = "the plugin is not run".to_owned();
-                    let help = "forces and motions by plugins are not simulated";
-                    reader.warning("W036", child, message, help);
-                }
+                "plugin" => warn_of_plugin(child, reader),
                 _ => {}
             }
         }
@@ -281,13 +280,24 @@ impl<'a> RobotElements<'a> {
             let Some(model) = self.models.take(include.node) else {
                 continue;
             };
-            if let Some(own) = pose(include.node, reader) {
+            let n_links = group.links.len() + model.links.len();
+            if let Some(own) = pose(include.node, reader)
+                && check_size(n_links, include.node, reader).is_some()
+            {
                 let prefix = format!(
                     "{}{}",
                     include.prefix,
                     sdf_pose::prefix(include.node, reader)
                 );
                 group.add(model, &(include.model * own), &prefix);
+                let plugins = xml::children(include.node, "plugin");
+                let couplings = plugins.filter(|plugin| sdf_robot_joint::is_coupling(*plugin));
+                self.couplings.extend(couplings.map(|node| WrittenPart {
+                    node,
+                    model: include.model,
+                    prefix: prefix.clone(),
+                    collides: None,
+                }));
             }
         }
         group.add_passing();

@@ -79,15 +79,19 @@ fn body(tree: &ModelTree, shapes: &mut Shapes, found: &mut Diagnostics) -> Body 
             read_link((link, at), tree, body, &mut meshes, shapes, found);
         }
     }
+    for (idx, body) in bodies.iter_mut().enumerate() {
+        let links = tree.links.iter().enumerate();
+        let own = links.filter(|(link, _)| assembly.body_of(*link) == idx);
+        let solids: Vec<&TreeSolid> = own.flat_map(|(_, link)| &link.solids).collect();
+        body.friction = friction(&solids, found);
+    }
     let names: Vec<&str> = tree.links.iter().map(|link| link.name.as_str()).collect();
-    let mut whole = assembly.attach(bodies, &names, found);
-    whole.friction = friction(tree, found);
-    whole
+    assembly.attach(bodies, &names, found)
 }
 
-/// The friction of an object: the largest of its shapes, as one number.
-fn friction(tree: &ModelTree, found: &mut Diagnostics) -> Option<f64> {
-    let solids = || tree.links.iter().flat_map(|link| &link.solids);
+/// The friction of a body: the largest of its shapes, as one number.
+fn friction(solids: &[&TreeSolid], found: &mut Diagnostics) -> Option<f64> {
+    let solids = || solids.iter().copied();
     if solids().all(|solid| solid.friction.is_none()) {
         return None;
     }
@@ -95,7 +99,7 @@ fn friction(tree: &ModelTree, found: &mut Diagnostics) -> Option<f64> {
     let most = solids().map(of).fold(0.0, f64::max);
     if let Some(other) = solids().find(|solid| of(solid) < most) {
         let message = format!(
-            "this geom has the friction {}, but the object has one friction here: its largest, {most}",
+            "this geom has the friction {}, but its body has one friction here: the largest, {most}",
             of(other)
         );
         warn(

@@ -4,12 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::foreign::geometry::{KINDS, kind_of};
+use crate::foreign::geometry::{KINDS, cone, kind_of};
 use crate::foreign::urdf::origin;
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostics, did_you_mean};
 use actcheck_data::{
-    ModelTree, TreeGeometry, TreeInertial, TreeJoint, TreeLink, TreeMimic, TreeMotion, TreeSolid,
+    Mesh, ModelTree, TreeGeometry, TreeInertial, TreeJoint, TreeLink, TreeMimic, TreeMotion,
+    TreeSolid,
 };
 
 /// Supported joint types.
@@ -54,14 +55,15 @@ pub(crate) fn read(root: Node, reader: &mut Reader) -> UrdfTree {
             continue;
         }
         let mut unheard = Reader::new(reader.source);
-        let visuals = solids(link, "visual", &mut unheard);
+        let meshes = &mut tree.inline_meshes;
+        let visuals = solids((link, "visual"), meshes, &mut unheard);
         if !unheard.found.is_empty() {
             faults_of_visuals.insert(name.to_owned(), unheard.found);
         }
         tree.links.push(TreeLink {
             name: name.to_owned(),
             inertial: inertial(link, reader),
-            solids: solids(link, "collision", reader),
+            solids: solids((link, "collision"), meshes, reader),
             visuals,
             place: reader.place(link),
         });
@@ -209,8 +211,12 @@ fn inertial(link: Node, reader: &mut Reader) -> Option<TreeInertial> {
 }
 
 /// Reads the shapes of a link in elements of this name. Those that are only placeholders are
-/// reported (W036).
-fn solids(link: Node, element: &str, reader: &mut Reader) -> Vec<TreeSolid> {
+/// reported (W036). Shapes without a mesh file get entries in `meshes`.
+fn solids(
+    (link, element): (Node, &str),
+    meshes: &mut BTreeMap<String, Mesh>,
+    reader: &mut Reader,
+) -> Vec<TreeSolid> {
     let mut found = Vec::new();
     for node in xml::children(link, element) {
         if let Some(shape) = placeholder(node) {
@@ -224,7 +230,7 @@ fn solids(link: Node, element: &str, reader: &mut Reader) -> Vec<TreeSolid> {
         }
         let pose = origin(node, reader);
         let geometry = reader.required(node, "geometry");
-        let geometry = geometry.and_then(|node| Some((node, read_geometry(node, reader)?)));
+        let geometry = geometry.and_then(|node| Some((node, read_geometry(node, meshes, reader)?)));
         let (Some(pose), Some((node, geometry))) = (pose, geometry) else {
             continue;
         };
@@ -245,7 +251,7 @@ fn placeholder(collision: Node) -> Option<Node> {
     let shape = xml::first(xml::child(collision, "geometry")?)?;
     let keys: &[&str] = match shape.tag_name().name() {
         "box" => &["size"],
-        "cylinder" | "capsule" => &["radius", "length"],
+        "cylinder" | "capsule" | "cone" => &["radius", "length"],
         "sphere" => &["radius"],
         _ => return None,
     };
@@ -259,7 +265,11 @@ fn placeholder(collision: Node) -> Option<Node> {
     keys.iter().all(is_zero).then_some(shape)
 }
 
-fn read_geometry(geometry: Node, reader: &mut Reader) -> Option<TreeGeometry> {
+fn read_geometry(
+    geometry: Node,
+    meshes: &mut BTreeMap<String, Mesh>,
+    reader: &mut Reader,
+) -> Option<TreeGeometry> {
     let kind = kind_of(geometry, reader)?;
     let number = |name: &str, reader: &mut Reader| {
         let written = reader.attribute(kind, name)?;
@@ -282,6 +292,15 @@ fn read_geometry(geometry: Node, reader: &mut Reader) -> Option<TreeGeometry> {
                 TreeGeometry::Cylinder { radius, length }
             } else {
                 TreeGeometry::Capsule { radius, length }
+            })
+        }
+        "cone" => {
+            let (radius, length) = (number("radius", reader), number("length", reader));
+            let name = format!("cone {}", meshes.len());
+            meshes.insert(name.clone(), cone(radius?, length?)?);
+            Some(TreeGeometry::Mesh {
+                file: name,
+                scale: [1.0; 3],
             })
         }
         "mesh" => {
@@ -326,7 +345,14 @@ fn read_joint(joint: Node, name: &str, ends: [&str; 2], reader: &mut Reader) -> 
 fn moving(joint: Node, fixed: TreeJoint, reader: &mut Reader) -> Option<TreeJoint> {
     let kind = reader.attribute(joint, "type")?;
     let motion = match kind {
-        "fixed" => return Some(fixed),
+        "fixed" => {
+            if let Some(mimic) = xml::child(joint, "mimic") {
+                let message = format!("the joint `{}` is fixed: it follows no other", fixed.name);
+                let help = "remove the `<mimic>`, or make the joint `revolute` or `prismatic`";
+                reader.warning("W036", mimic, message, help);
+            }
+            return Some(fixed);
+        }
         "planar" => TreeMotion::Planar,
         "floating" => TreeMotion::Floating,
         "prismatic" => TreeMotion::Prismatic,
@@ -460,6 +486,8 @@ fn check_tree(
     above: &BTreeMap<&str, (Node, &str)>,
     reader: &mut Reader,
 ) {
+    // Faulty joints make connected links look disconnected.
+    let is_faulty = reader.found.has_errors();
     let mut circles: BTreeSet<&str> = BTreeSet::new();
     for start in links {
         let mut seen = BTreeSet::new();
@@ -487,8 +515,7 @@ fn check_tree(
         .copied()
         .filter(|link| !above.contains_key(link))
         .collect();
-    // Faulty joints make connected links look disconnected.
-    if roots.len() > 1 && !reader.found.has_errors() {
+    if roots.len() > 1 && !is_faulty {
         let message = format!(
             "the links form {} trees, with the roots `{}`",
             roots.len(),
