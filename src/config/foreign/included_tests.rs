@@ -608,3 +608,33 @@ fn defaults_of_masses_are_named_at_each_link() {
         assert!(line.contains(place) && line.contains(what), "{said}");
     }
 }
+
+/// A mesh in millimetres was measured before its scale was used.
+#[test]
+fn meshes_in_millimetres_are_measured_in_metres() {
+    let mesh = |size: i32| {
+        format!(
+            "v 0 0 0\nv {size} 0 0\nv 0 {size} 0\nv 0 0 {size}\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+        )
+    };
+    let urdf = |scale: &str| {
+        format!(
+            "<robot name=\"r\"><link name=\"a\"><collision><geometry><mesh filename=\"m.obj\" scale=\"{scale}\"/>\
+             </geometry></collision></link></robot>"
+        )
+    };
+    let (small, large) = ("0.001 0.001 0.001", "1 1 1");
+    let folder = Folder::new(&[
+        ("m.obj", mesh(1500)),
+        ("a.urdf", urdf(small)),
+        ("b.urdf", urdf(large)),
+    ]);
+    assert!(folder.robot("a.urdf").0.is_some());
+    assert!(folder.object("a.urdf").is_ok());
+    for said in [
+        folder.robot("b.urdf").1,
+        folder.object("b.urdf").expect_err("it is large"),
+    ] {
+        assert!(said.contains("reaches 1500 m"), "{said}");
+    }
+}

@@ -37,6 +37,7 @@ pub(crate) mod robot_shapes;
 
 mod geom_mass;
 mod sdf;
+mod sdf_ends;
 mod sdf_inertial;
 mod sdf_joint;
 mod sdf_link;

@@ -12,6 +12,7 @@ use crate::foreign::frames::{Frame, Included, OWN};
 use crate::foreign::geometry::Shapes;
 use crate::foreign::inclusions::check_size;
 use crate::foreign::sdf::is_static;
+use crate::foreign::sdf_ends::{JointEnd, WrittenPart, last_name};
 use crate::foreign::sdf_pose::{self, pose, prefix};
 use crate::foreign::sdf_surface::{
     Surface, prefixed, refuse_self_collision, warn_of_usual_friction,
@@ -103,21 +104,12 @@ pub(crate) struct SubModel {
     pub(crate) digest: String,
 }
 
-/// A link or joint of a model, before it is read.
-struct Written<'a> {
-    node: Node<'a>,
-    /// Pose of its model in the outermost one.
-    model: Isometry3<f64>,
-    /// The beginning of the names in its model.
-    prefix: String,
-}
-
 /// The elements of a model and of the models nested in it, and the models that they include.
 #[derive(Default)]
 struct Elements<'a> {
-    links: Vec<Written<'a>>,
-    joints: Vec<Written<'a>>,
-    includes: Vec<Written<'a>>,
+    links: Vec<WrittenPart<'a>>,
+    joints: Vec<WrittenPart<'a>>,
+    includes: Vec<WrittenPart<'a>>,
     /// A switch by which links of a model that can move collide with each other.
     collides: Option<Span>,
     models: BTreeMap<usize, SubModel>,
@@ -207,7 +199,7 @@ impl Tree {
 
     fn read_link(
         &mut self,
-        link: &Written,
+        link: &WrittenPart,
         (role, stays): (Role, bool),
         shapes: &mut Shapes,
         reader: &mut Reader,
@@ -271,8 +263,8 @@ impl Tree {
             }));
     }
 
-    /// Reads a joint of a model that can move. Reports W035 if it does not connect links.
-    fn read_joint(&self, joint: &Written, reader: &mut Reader) -> Option<Joint> {
+    /// Reads a joint of a model that can move. Reports W051 if it does not connect links.
+    fn read_joint(&self, joint: &WrittenPart, reader: &mut Reader) -> Option<Joint> {
         let node = joint.node;
         sdf_joint::JOINT.check(node, reader);
         let is_rigid = sdf_joint::is_rigid(node);
@@ -280,20 +272,18 @@ impl Tree {
             sdf_joint::kind(node, reader)?;
         }
         let name = node.attribute("name").unwrap_or_default();
+        let links: Vec<&str> = self.links.iter().map(|link| link.name.as_str()).collect();
         let (parent, child) = (
-            self.end(joint, "parent", reader),
-            self.end(joint, "child", reader),
+            joint.end("parent", &links, reader),
+            joint.end("child", &links, reader),
         );
         let (parent, child) = (parent?, child?);
-        let to_world = parent == End::World || child == End::World;
+        let to_world = [parent, child].contains(&JointEnd::World);
         let moves = if is_rigid {
             None
         } else {
-            let usual = match child {
-                End::Link(idx) => self.frame_of_child(joint, idx, reader),
-                End::World => Some(joint.model),
-            };
-            let moves = sdf_joint::read(node, &usual?, &joint.model, reader)?;
+            let usual = joint.frame_of_child(child, |idx| self.links[idx].pose, reader)?;
+            let moves = sdf_joint::read(node, &usual, &joint.model, reader)?;
             if to_world {
                 let message = format!("the joint `{name}` moves the whole model against the world");
                 let help = "connect links of the model itself, or make the joint `fixed`";
@@ -310,51 +300,6 @@ impl Tree {
             moves,
             to_world,
         })
-    }
-
-    /// Returns the frame in which the pose of a joint is: that of its child.
-    fn frame_of_child(
-        &self,
-        joint: &Written,
-        link: usize,
-        reader: &mut Reader,
-    ) -> Option<Isometry3<f64>> {
-        let named = xml::text(xml::child(joint.node, "child")?);
-        let carrier = sdf_pose::carrier(joint.node, named, reader);
-        if carrier.is_none_or(|carrier| carrier == named) {
-            return Some(self.links[link].pose);
-        }
-        Some(joint.model * sdf_pose::frame(joint.node, named, reader)?)
-    }
-
-    /// Returns the link that an end of a joint names, itself or by a frame. Reports W035, and
-    /// returns `None`, if there is no such link.
-    fn end(&self, joint: &Written, which: &str, reader: &mut Reader) -> Option<End> {
-        let element = reader.required(joint.node, which)?;
-        let named = xml::text(element);
-        let position = |name: &str| self.links.iter().position(|link| link.name == name);
-        let carried = sdf_pose::carrier(joint.node, named, reader)
-            .and_then(|link| position(&format!("{}{link}", joint.prefix)));
-        if let Some(idx) = carried {
-            return Some(End::Link(idx));
-        }
-        if named == "world" {
-            return Some(End::World);
-        }
-        // Early versions name links without, or with other, names of models.
-        let last = |name: &str| name.rsplit("::").next().unwrap_or(name).to_owned();
-        let mut alike =
-            (0..self.links.len()).filter(|idx| last(&self.links[*idx].name) == last(named));
-        if let (Some(idx), None) = (alike.next(), alike.next()) {
-            return Some(End::Link(idx));
-        }
-        let name = joint.node.attribute("name").unwrap_or_default();
-        let message = format!(
-            "the joint `{name}` does not connect two links of this model: there is no `{named}`"
-        );
-        let help = "connect links of the model itself, or make the joint `fixed`";
-        reader.error("W035", element, message, help);
-        None
     }
 
     /// Returns the bodies that the links form: one, with those that joints move. Nothing moves in a
@@ -374,7 +319,7 @@ impl Tree {
         let names: Vec<String> = self
             .links
             .iter()
-            .map(|link| last_name(&link.name))
+            .map(|link| last_name(&link.name).to_owned())
             .collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         let mut bodies = assembly.empty_bodies(fixed);
@@ -444,23 +389,6 @@ impl Tree {
     }
 }
 
-/// An end of a joint.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum End {
-    /// A link, by its index.
-    Link(usize),
-    World,
-}
-
-impl End {
-    fn link(self) -> Option<usize> {
-        match self {
-            Self::Link(idx) => Some(idx),
-            Self::World => None,
-        }
-    }
-}
-
 impl Joint {
     /// Whether it ties the model to the world.
     fn anchors(&self) -> bool {
@@ -475,11 +403,6 @@ impl Joint {
             joint: self.moves,
         })
     }
-}
-
-/// The last part of a link's name.
-fn last_name(name: &str) -> String {
-    name.rsplit("::").next().unwrap_or(name).to_owned()
 }
 
 /// Warns of a joint that does not move in a world.
@@ -527,7 +450,7 @@ impl<'a> Elements<'a> {
             self.collides = self_collision(model, reader);
         }
         for child in model.children().filter(Node::is_element) {
-            let written = |node| Written {
+            let written = |node| WrittenPart {
                 node,
                 model: *at,
                 prefix: prefix.to_owned(),
@@ -558,7 +481,7 @@ impl<'a> Elements<'a> {
 
     /// Whether a joint ties the model to the world, and none of its joints moves.
     fn stay(&self) -> bool {
-        let to_world = |joint: &Written| {
+        let to_world = |joint: &WrittenPart| {
             let name = |end| xml::child(joint.node, end).map(xml::text);
             [name("parent"), name("child")].contains(&Some("world"))
         };

@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use nalgebra::Isometry3;
 
-use crate::foreign::sdf_robot_model::{Group, JointAt, JointEnd, LinkAt};
+use crate::foreign::sdf_ends::JointEnd;
+use crate::foreign::sdf_robot_model::{Group, JointAt, LinkAt};
 use crate::foreign::xml::{self, Reader};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_data::{ModelTree, TreeJoint, TreeLink, TreeMotion};
@@ -93,10 +94,7 @@ fn leave_out_spare_links(group: &mut Group, reader: &mut Reader) {
         .joints
         .iter()
         .flat_map(|joint| joint.ends)
-        .filter_map(|end| match end {
-            JointEnd::Link(idx) => Some(idx),
-            JointEnd::World => None,
-        })
+        .filter_map(JointEnd::link)
         .collect();
     let is_spare = |idx: usize, link: &LinkAt| {
         let has_mass = link.link.inertial.as_ref().is_some_and(|own| own.kg > 0.0);
@@ -165,10 +163,7 @@ fn add_root(group: &mut Group, reader: &mut Reader) -> usize {
     let root = match to_world.as_slice() {
         [] => Some(widest(group)),
         [only] if only.joint.motion == TreeMotion::Fixed => {
-            only.ends.iter().find_map(|end| match end {
-                JointEnd::Link(idx) => Some(*idx),
-                JointEnd::World => None,
-            })
+            only.ends.iter().find_map(|end| end.link())
         }
         _ => None,
     };

@@ -516,7 +516,7 @@ fn models_in_models_are_where_their_files_put_them() {
         ),
         (
             format!("{base}{}{}", include("", ""), fixed("handle::bra")),
-            "there is no `handle::bra`",
+            "there is no link `handle::bra`",
         ),
         (
             format!(
