@@ -1,4 +1,4 @@
-//! Shapes in SDF and URDF.
+//! Shapes in SDF, and those of trees.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
@@ -45,10 +45,7 @@ impl<'a> Shapes<'a> {
         if kind.tag_name().name() == "mesh" {
             return self.sdf_mesh(kind, reader);
         }
-        primitive(kind, reader, |name, reader| {
-            let node = reader.required(kind, name)?;
-            Some((node, xml::text(node)))
-        })
+        primitive(kind, reader)
     }
 
     fn sdf_mesh(&mut self, mesh: Node, reader: &mut Reader) -> Option<Shape> {
@@ -73,23 +70,7 @@ impl<'a> Shapes<'a> {
         self.mesh(uri, xml::text(uri), scale, reader)
     }
 
-    /// Reads the shape of a URDF `<geometry>`. Returns `None` after it has reported a fault.
-    pub(crate) fn urdf(&mut self, geometry: Node, reader: &mut Reader) -> Option<Shape> {
-        let kind = kind_of(geometry, reader)?;
-        if kind.tag_name().name() != "mesh" {
-            return primitive(kind, reader, |name, reader| {
-                Some((kind, reader.attribute(kind, name)?))
-            });
-        }
-        let uri = reader.attribute(kind, "filename")?;
-        let scale = match kind.attribute("scale") {
-            Some(scale) => reader.numbers(kind, scale, Bound::Finite)?,
-            None => [1.0; 3],
-        };
-        self.mesh(kind, uri, scale, reader)
-    }
-
-    pub(crate) fn mesh(
+    fn mesh(
         &mut self,
         node: Node,
         uri: &str,
@@ -213,13 +194,12 @@ pub(crate) fn kind_of<'n>(geometry: Node<'n>, reader: &mut Reader) -> Option<Nod
     kind
 }
 
-/// Reads a primitive shape. `written` finds its parameters by name: elements in SDF, attributes in
-/// URDF.
-fn primitive<'n>(
-    kind: Node<'n>,
-    reader: &mut Reader,
-    written: impl Fn(&str, &mut Reader) -> Option<(Node<'n>, &'n str)>,
-) -> Option<Shape> {
+/// Reads a primitive shape of SDF.
+fn primitive(kind: Node, reader: &mut Reader) -> Option<Shape> {
+    let written = |name: &str, reader: &mut Reader| {
+        let node = reader.required(kind, name)?;
+        Some((node, xml::text(node)))
+    };
     let number = |reader: &mut Reader, name: &str| {
         let (node, text) = written(name, reader)?;
         reader

@@ -96,6 +96,7 @@ fn urdf(source: &Source, found: &mut Diagnostics) -> Result<UrdfTree, Diagnostic
         reader.error("W032", root, message, help);
         UrdfTree {
             tree: ModelTree::default(),
+            is_whole: false,
             faults_of_visuals: BTreeMap::new(),
         }
     };

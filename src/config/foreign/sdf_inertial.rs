@@ -139,11 +139,7 @@ fn read_inertia(inertia: Node, reader: &mut Reader) -> Option<Matrix3<f64>> {
 
 /// Returns the moments of inertia if they are possible. Otherwise warns (W036) and returns `None`:
 /// they are then computed from the shapes.
-pub(crate) fn possible(
-    moments: Matrix3<f64>,
-    inertia: Node,
-    reader: &mut Reader,
-) -> Option<Matrix3<f64>> {
+fn possible(moments: Matrix3<f64>, inertia: Node, reader: &mut Reader) -> Option<Matrix3<f64>> {
     if is_possible(&moments) {
         return Some(moments);
     }

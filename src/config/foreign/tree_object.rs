@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Matrix3};
 
 use crate::foreign::assembly::{Assembly, Join};
 use crate::foreign::body::{Body, Mass, SdfModel, is_possible};
@@ -23,7 +23,11 @@ const FRICTION: f64 = 1.0;
 /// there are errors. A body without shapes is one that is only seen.
 pub(crate) fn read(tree: &ModelTree, shapes: &mut Shapes) -> (Option<SdfModel>, Diagnostics) {
     let mut found = Diagnostics::new();
-    let body = body(tree, shapes, &mut found);
+    let material = |members: &[usize], body: &mut Body, found: &mut Diagnostics| {
+        let solids = members.iter().flat_map(|link| &tree.links[*link].solids);
+        body.friction = friction(&solids.collect::<Vec<_>>(), found);
+    };
+    let body = body(tree, shapes, false, material, &mut found);
     if found.has_errors() {
         return (None, found);
     }
@@ -37,17 +41,31 @@ pub(crate) fn read(tree: &ModelTree, shapes: &mut Shapes) -> (Option<SdfModel>, 
     (Some(model), found)
 }
 
-fn body(tree: &ModelTree, shapes: &mut Shapes, found: &mut Diagnostics) -> Body {
+/// Makes the body of a tree, with those that joints move, and reports its faults. `is_static`: it
+/// never moves. `material` gives a body its material; its links are named by their indices.
+pub(crate) fn body(
+    tree: &ModelTree,
+    shapes: &mut Shapes,
+    is_static: bool,
+    mut material: impl FnMut(&[usize], &mut Body, &mut Diagnostics),
+    found: &mut Diagnostics,
+) -> Body {
     let index: BTreeMap<&str, usize> = tree
         .links
         .iter()
         .enumerate()
         .map(|(idx, link)| (link.name.as_str(), idx))
         .collect();
+    let above: BTreeMap<&str, &TreeJoint> = tree
+        .joints
+        .iter()
+        .rev()
+        .map(|joint| (joint.child.as_str(), joint))
+        .collect();
     let places: Vec<Option<Isometry3<f64>>> = tree
         .links
         .iter()
-        .map(|link| place(link, tree, found))
+        .map(|link| place(link, &above, found))
         .collect();
     let mut joins = Vec::new();
     for joint in &tree.joints {
@@ -71,7 +89,7 @@ fn body(tree: &ModelTree, shapes: &mut Shapes, found: &mut Diagnostics) -> Body 
         });
     }
     let assembly = Assembly::of(tree.links.len(), &joins, found);
-    let mut bodies = assembly.empty_bodies(false);
+    let mut bodies = assembly.empty_bodies(is_static);
     let mut meshes = BTreeMap::new();
     for (idx, (link, at)) in tree.links.iter().zip(&places).enumerate() {
         if let Some(at) = at {
@@ -80,10 +98,8 @@ fn body(tree: &ModelTree, shapes: &mut Shapes, found: &mut Diagnostics) -> Body 
         }
     }
     for (idx, body) in bodies.iter_mut().enumerate() {
-        let links = tree.links.iter().enumerate();
-        let own = links.filter(|(link, _)| assembly.body_of(*link) == idx);
-        let solids: Vec<&TreeSolid> = own.flat_map(|(_, link)| &link.solids).collect();
-        body.friction = friction(&solids, found);
+        let own = (0..tree.links.len()).filter(|link| assembly.body_of(*link) == idx);
+        material(&own.collect::<Vec<_>>(), body, found);
     }
     let names: Vec<&str> = tree.links.iter().map(|link| link.name.as_str()).collect();
     assembly.attach(bodies, &names, found)
@@ -121,11 +137,16 @@ fn warn(found: &mut Diagnostics, message: String, at: &SourceSpan, help: &str) {
 }
 
 /// Returns the pose of a link relative to the root, through its chain of joints.
-fn place(link: &TreeLink, tree: &ModelTree, found: &mut Diagnostics) -> Option<Isometry3<f64>> {
+/// `above` are the joints by their children.
+fn place(
+    link: &TreeLink,
+    above: &BTreeMap<&str, &TreeJoint>,
+    found: &mut Diagnostics,
+) -> Option<Isometry3<f64>> {
     let mut at = Isometry3::identity();
-    let mut name = &link.name;
+    let mut name = link.name.as_str();
     for _ in 0..LONGEST_CHAIN {
-        let Some(joint) = tree.joints.iter().find(|joint| joint.child == *name) else {
+        let Some(joint) = above.get(name) else {
             return Some(at);
         };
         at = joint.origin * at;
@@ -185,7 +206,9 @@ fn read_link(
     let turned = pose.rotation.to_rotation_matrix();
     let about_com = turned.matrix() * stated.about_com * turned.matrix().transpose();
     let possible = is_possible(&about_com);
-    if !possible {
+    // Those that no file states are computed without a word.
+    let is_unstated = stated.moments_place.is_none() && stated.about_com == Matrix3::zeros();
+    if !possible && !is_unstated {
         let message =
             "these moments of inertia are impossible: they are computed from the shapes instead";
         let place = stated.moments_place.as_ref().unwrap_or(&stated.place);

@@ -2,10 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use crate::foreign::geometry::{KINDS, cone, kind_of};
-use crate::foreign::urdf::origin;
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostics, did_you_mean};
 use actcheck_data::{
@@ -31,6 +30,8 @@ const SINGLE: [&str; 8] = [
 /// A tree, and the faults of shapes that are only seen: they matter if such a shape has to collide.
 pub(crate) struct UrdfTree {
     pub(crate) tree: ModelTree,
+    /// Whether the links form one tree.
+    pub(crate) is_whole: bool,
     pub(crate) faults_of_visuals: BTreeMap<String, Diagnostics>,
 }
 
@@ -68,24 +69,34 @@ pub(crate) fn read(root: Node, reader: &mut Reader) -> UrdfTree {
             place: reader.place(link),
         });
     }
-    if tree.links.is_empty() {
+    let is_whole = if tree.links.is_empty() {
         reader.error(
             "W051",
             root,
             "the robot has no links".to_owned(),
             "add `<link name=\"base_link\"/>`",
         );
+        false
     } else {
-        read_joints(root, &names, &mut tree, reader);
+        let is_whole = read_joints(root, &names, &mut tree, reader);
         read_passing(root, &mut tree, reader);
-    }
+        is_whole
+    };
     UrdfTree {
         tree,
+        is_whole,
         faults_of_visuals,
     }
 }
 
-fn read_joints(root: Node, links: &BTreeSet<&str>, tree: &mut ModelTree, reader: &mut Reader) {
+/// Reads all joints. Returns whether the links form one tree.
+fn read_joints(
+    root: Node,
+    links: &BTreeSet<&str>,
+    tree: &mut ModelTree,
+    reader: &mut Reader,
+) -> bool {
+    let mut is_whole = true;
     // Joint and parent link by child link.
     let mut above: BTreeMap<&str, (Node, &str)> = BTreeMap::new();
     let mut names = BTreeSet::new();
@@ -106,9 +117,11 @@ fn read_joints(root: Node, links: &BTreeSet<&str>, tree: &mut ModelTree, reader:
         let ends = [parent, child].map(Option::unwrap_or_default);
         tree.joints.push(read_joint(joint, name, ends, reader));
         let (Some(parent), Some(child)) = (parent, child) else {
+            is_whole = false;
             continue;
         };
         if above.insert(child, (joint, parent)).is_some() {
+            is_whole = false;
             let message = format!("the link `{child}` is the child of two joints");
             reader.error(
                 "W051",
@@ -118,7 +131,7 @@ fn read_joints(root: Node, links: &BTreeSet<&str>, tree: &mut ModelTree, reader:
             );
         }
     }
-    check_tree(root, links, &above, reader);
+    check_tree(root, links, &above, reader) && is_whole
 }
 
 /// Reads the pairs of links of `<disable_collisions>`: elements of SRDF, which some tools write
@@ -176,6 +189,18 @@ fn warn_about_repeated(joint: Node, reader: &mut Reader) {
             reader.warning("W036", further, message, "remove the others");
         }
     }
+}
+
+/// Reads the `<origin>` of an element; the identity if it has none.
+fn origin(node: Node, reader: &mut Reader) -> Option<Isometry3<f64>> {
+    let Some(written) = xml::child(node, "origin") else {
+        return Some(Isometry3::identity());
+    };
+    let mut three = |name: &str| match written.attribute(name) {
+        Some(text) => reader.numbers(written, text, Bound::Finite),
+        None => Some([0.0; 3]),
+    };
+    Some(xml::placed(three("xyz")?, three("rpy")?))
 }
 
 /// Reads the mass of a link; `None` if it has none, or after a fault. Moments that are missing are
@@ -394,6 +419,15 @@ fn moving(joint: Node, fixed: TreeJoint, reader: &mut Reader) -> Option<TreeJoin
     }
     let limit = reader.required(joint, "limit")?;
     (read.effort, read.velocity) = efforts(limit, reader);
+    if motion == TreeMotion::Revolute
+        && ["lower", "upper"]
+            .into_iter()
+            .all(|key| limit.attribute(key).is_some_and(is_infinite))
+    {
+        (read.lower, read.upper) = (f64::NEG_INFINITY, f64::INFINITY);
+        read.motion = TreeMotion::Continuous;
+        return Some(read);
+    }
     let mut end = |key: &str| match limit.attribute(key) {
         Some(written) => reader
             .numbers::<1>(limit, written, Bound::Finite)
@@ -413,11 +447,15 @@ fn moving(joint: Node, fixed: TreeJoint, reader: &mut Reader) -> Option<TreeJoin
     Some(read)
 }
 
+fn is_infinite(written: &str) -> bool {
+    written.trim().parse::<f64>().is_ok_and(f64::is_infinite)
+}
+
 /// Reads the largest effort and velocity: 0 if they are unknown. A limit of -1 means none, as in
-/// SDF.
+/// SDF, and so does an infinite one.
 fn efforts(limit: Node, reader: &mut Reader) -> (f64, f64) {
     let mut number = |key: &str| match limit.attribute(key).map(str::trim) {
-        Some(written) if written.parse() != Ok(-1.0) => reader
+        Some(written) if written.parse() != Ok(-1.0) && !is_infinite(written) => reader
             .numbers::<1>(limit, written, Bound::NotNegative)
             .map_or(0.0, |[number]| number),
         _ => 0.0,
@@ -479,13 +517,13 @@ fn end<'n>(
     Some(link)
 }
 
-/// Checks that there are one root and no cycles.
+/// Checks that there are one root and no cycles. Returns whether that is so.
 fn check_tree(
     root: Node,
     links: &BTreeSet<&str>,
     above: &BTreeMap<&str, (Node, &str)>,
     reader: &mut Reader,
-) {
+) -> bool {
     // Faulty joints make connected links look disconnected.
     let is_faulty = reader.found.has_errors();
     let mut circles: BTreeSet<&str> = BTreeSet::new();
@@ -528,4 +566,5 @@ fn check_tree(
             "links form one tree: join them with joints of the type `fixed`",
         );
     }
+    circles.is_empty() && roots.len() == 1
 }
