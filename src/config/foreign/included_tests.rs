@@ -638,3 +638,67 @@ fn meshes_in_millimetres_are_measured_in_metres() {
         assert!(said.contains("reaches 1500 m"), "{said}");
     }
 }
+
+/// Objects in URDF had a reader of their own, which knew less of trees than that of robots.
+#[test]
+fn objects_in_urdf_are_read_as_trees() {
+    let solid = "<collision><geometry><box size=\"0.1 0.1 0.1\"/></geometry></collision>";
+    let link = |name: &str, inside: &str| format!("<link name=\"{name}\">{inside}</link>");
+    let joint = |kind: &str, child: &str, inside: &str| {
+        format!(
+            "<joint name=\"{child}_joint\" type=\"{kind}\"><parent link=\"a\"/><child link=\"{child}\"/>{inside}</joint>"
+        )
+    };
+    let mass = |kg: f64| format!("<inertial><mass value=\"{kg}\"/></inertial>");
+    let limit = |lower: &str, upper: &str| {
+        format!("<limit lower=\"{lower}\" upper=\"{upper}\" effort=\"inf\" velocity=\"1\"/>")
+    };
+    let of = |inside: &str| {
+        let text = format!(
+            "<robot name=\"r\">{}{inside}</robot>",
+            link("a", &(mass(2.0) + solid))
+        );
+        Folder::new(&[("a.urdf", text)]).object("a.urdf")
+    };
+    let hinged = |lower: &str, upper: &str| {
+        link("b", &(mass(1.0) + solid)) + &joint("revolute", "b", &limit(lower, upper))
+    };
+    let (model, _) = of(&hinged("-inf", "inf")).expect("it turns");
+    assert_eq!(
+        model.moving[0].joint.range,
+        [f64::NEG_INFINITY, f64::INFINITY]
+    );
+    let (model, _) = of(&hinged("0", "0")).expect("it is fixed");
+    assert_eq!((model.moving.len(), model.parts.len()), (0, 2));
+    assert!((model.mass_kg - 3.0).abs() < 1e-12);
+    // The link of a sensor, without a mass.
+    let lens = link("lens", &mass(0.0)) + &joint("fixed", "lens", "");
+    let (model, warnings) = of(&lens).expect("it has a lens");
+    assert!(
+        (model.mass_kg - 2.0).abs() < 1e-12 && warnings.is_empty(),
+        "{warnings}"
+    );
+    for (inside, said) in [
+        (link("b", solid), "the links form 2 trees"),
+        (
+            link("b", "") + &joint("fixed", "c", ""),
+            "there is no link `c`",
+        ),
+        (link("a", solid), "there are two links `a`"),
+        (
+            link("b", &(mass(0.0) + solid)) + &joint("fixed", "b", ""),
+            "collides but has a mass of 0",
+        ),
+        (
+            link("b", solid) + &joint("revolute", "b", &(limit("0", "1") + "<mimic joint=\"c\"/>")),
+            "`<mimic>`",
+        ),
+        (
+            link("b", solid) + &joint("planar", "b", ""),
+            "of the type planar",
+        ),
+    ] {
+        let found = of(&inside).expect_err(said);
+        assert!(found.contains(said), "{said}: {found}");
+    }
+}
