@@ -398,7 +398,7 @@ fn urdf_has_cones_and_names_geometries_that_it_lacks() {
     assert!(folder.object("a.urdf").is_ok());
     for said in [
         folder.robot("b.urdf").1,
-        folder.object("b.urdf").expect_err("it is no cone"),
+        folder.object("b.urdf").expect_err("it is not a cone"),
     ] {
         assert!(said.contains("`<torus>`"), "{said}");
     }
@@ -406,7 +406,7 @@ fn urdf_has_cones_and_names_geometries_that_it_lacks() {
 
 /// The height of a root `<include>` was said to be left out, but the robot hung in the air.
 #[test]
-fn a_robot_that_is_only_included_stands_where_a_scene_puts_it() {
+fn a_robot_that_is_only_included_has_the_pose_of_a_scene() {
     let arm = format!(
         "{}{}{}",
         link("a"),
@@ -441,9 +441,9 @@ fn a_body_of_an_mjcf_world_is_named_at_its_place() {
     let text = "<mujoco><worldbody>\n<body name=\"a\" pos=\"0 0 1\"><freejoint/><geom type=\"box\" size=\".2 .2 .2\"/></body>\
                 \n<body name=\"b\" pos=\"40 0 1\"><geom type=\"box\" size=\".2 .2 .2\"/></body></worldbody></mujoco>";
     let (_, said) = Folder::new(&[]).world("w.xml", text);
-    let at = |what: &str| {
+    let at = |words: &str| {
         said.lines()
-            .find(|line| line.contains(what))
+            .find(|line| line.contains(words))
             .map(str::to_owned)
     };
     assert!(
@@ -567,7 +567,7 @@ fn spare_links_and_slip_are_left_out_with_a_warning() {
     }
 }
 
-/// SDF has 1 kg and 1 kg·m² for what a link does not state.
+/// A link that does not state its mass has 1 kg in SDF, and moments of 1 kg·m².
 #[test]
 fn defaults_of_masses_are_named_at_each_link() {
     let of = |name: &str, inertial: &str| {
@@ -600,12 +600,12 @@ fn defaults_of_masses_are_named_at_each_link() {
         .filter(|line| line.contains("the default of SDF"))
         .collect();
     assert_eq!(stated.len(), 3, "{said}");
-    for (line, (place, what)) in stated.iter().zip([
+    for (line, (place, words)) in stated.iter().zip([
         ("a.sdf:1:", "no mass and no moments"),
         ("a.sdf:2:1", "no moments of inertia: 1 kg·m²"),
         ("a.sdf:3:1", "no mass: 1 kg"),
     ]) {
-        assert!(line.contains(place) && line.contains(what), "{said}");
+        assert!(line.contains(place) && line.contains(words), "{said}");
     }
 }
 

@@ -13,7 +13,7 @@ const DEEPEST: usize = 8;
 /// twice would otherwise be read thousands of times.
 const MOST: usize = 1_000;
 
-/// The files around the one that is being read, and what their document has included so far.
+/// The files around the one that is being read, and the size of all files that their document includes.
 #[derive(Clone, Default)]
 pub(crate) struct Inclusions {
     /// The included files, from the outermost one to this one.

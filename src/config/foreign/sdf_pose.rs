@@ -209,11 +209,24 @@ fn included<'r>(node: Node, reader: &'r Reader) -> Option<&'r Included> {
         .filter(|_| node.tag_name().name() == "include")
 }
 
+/// The name of an element, or else that of the model that it includes.
 pub(super) fn name_of(node: Node, reader: &Reader) -> Option<String> {
     node.attribute("name")
         .or_else(|| xml::child(node, "name").map(xml::text))
         .map(str::to_owned)
         .or_else(|| included(node, reader).map(|included| included.name.clone()))
+}
+
+/// Whether an element has a name; without a copy of it, because all elements may be searched for all
+/// names.
+fn has_name(node: Node, name: &str, reader: &Reader) -> bool {
+    let own = node
+        .attribute("name")
+        .or_else(|| Some(xml::text(xml::child(node, "name")?)));
+    match own {
+        Some(own) => own == name,
+        None => included(node, reader).is_some_and(|included| included.name == name),
+    }
 }
 
 fn with_frame<'a>(model: Node<'a>) -> impl Iterator<Item = Node<'a>> {
@@ -229,7 +242,7 @@ fn find<'a, 'n>(
     name: &'n str,
     reader: &Reader,
 ) -> Option<(Node<'a>, Option<&'n str>)> {
-    let is_named = |child: &Node<'a>, name: &str| name_of(*child, reader).as_deref() == Some(name);
+    let is_named = |child: &Node<'a>, name: &str| has_name(*child, name, reader);
     if let Some(child) = with_frame(model).find(|child| is_named(child, name)) {
         return Some((child, None));
     }
