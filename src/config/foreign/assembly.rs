@@ -119,15 +119,15 @@ impl Assembly {
 
     /// Attaches the bodies that joints move to the first. `names` are those of the links. A body
     /// without shapes is left out with a warning (W036), or refused if it carries others (W035).
+    /// Also returns the moving part that each body became; `None` for the first and those left out.
     pub(crate) fn attach(
         &self,
         bodies: Vec<Body>,
         names: &[&str],
         found: &mut Diagnostics,
-    ) -> Body {
+    ) -> (Body, Vec<Option<usize>>) {
         let mut bodies = bodies.into_iter();
         let mut whole = bodies.next().unwrap_or_default();
-        // The part that each body became.
         let mut parts: Vec<Option<usize>> = vec![None];
         for (idx, (moved, body)) in self.moved.iter().zip(bodies).enumerate() {
             let link = names[moved.link];
@@ -161,7 +161,7 @@ impl Assembly {
                 joint: moved.joint,
             });
         }
-        whole
+        (whole, parts)
     }
 }
 

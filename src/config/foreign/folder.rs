@@ -158,7 +158,8 @@ impl Opened {
             return model.ok_or(said);
         }
         let (model, _) = self.body(lookup)?;
-        let (tree, frames) = Tree::of_body(model.body, fixed);
+        let (tree, mut frames) = Tree::of_body(model.body, fixed);
+        frames.extend(model.frames);
         let stem = self.path.file_stem();
         Ok(SubModel {
             tree,

@@ -702,3 +702,30 @@ fn objects_in_urdf_are_read_as_trees() {
         assert!(found.contains(said), "{said}: {found}");
     }
 }
+
+/// Only the bodies of an included URDF had names in the model around it.
+#[test]
+fn links_of_an_included_urdf_can_be_named() {
+    let solid = "<collision><geometry><box size=\"0.1 0.1 0.1\"/></geometry></collision>";
+    let urdf = format!(
+        "<robot name=\"tool\"><link name=\"holder\">{solid}</link><link name=\"tip\">{solid}</link>\
+         <joint name=\"j\" type=\"fixed\"><parent link=\"holder\"/><child link=\"tip\"/><origin xyz=\"0 0 0.5\"/></joint></robot>"
+    );
+    for end in ["tool::holder", "tool::tip"] {
+        let tag = link("tag").replace(
+            "<collision",
+            &format!("<pose relative_to=\"{end}\">0 1 0 0 0 0</pose><collision"),
+        );
+        let text = format!(
+            "{tag}{}{}",
+            include("tool", "<name>tool</name>"),
+            joint("fixed", ["tag", end], "").replace("_joint", "")
+        );
+        let folder = Folder::new(&[("tool.urdf", urdf.clone()), ("a/model.sdf", model(&text))]);
+        let (model, _) = folder.object("a/model.sdf").expect(end);
+        assert_eq!((model.parts.len(), model.moving.len()), (3, 0));
+        let raised = model.parts[0].pose.position[2] - model.parts[1].pose.position[2];
+        let expected = if end == "tool::tip" { 0.5 } else { 0.0 };
+        assert!((raised - expected).abs() < 1e-9, "{end}: {raised}");
+    }
+}

@@ -335,7 +335,7 @@ impl Tree {
         for body in &bodies {
             warn_of_usual_friction(body, self.at.clone(), reader);
         }
-        let body = assembly.attach(bodies, &names, &mut reader.found);
+        let (body, _) = assembly.attach(bodies, &names, &mut reader.found);
         refuse_self_collision(&body, self.collides, reader);
         body
     }

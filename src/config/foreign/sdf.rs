@@ -1,5 +1,6 @@
 //! Reads SDF models, Gazebo's format.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::foreign::body::{Role, SdfModel};
@@ -36,6 +37,7 @@ pub(crate) fn read(
         Some(SdfModel {
             is_static: body.fixed,
             body,
+            frames: BTreeMap::new(),
             pose,
             digest: shapes.digest.clone().finish(),
         })

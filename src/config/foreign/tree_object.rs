@@ -6,6 +6,7 @@ use nalgebra::{Isometry3, Matrix3};
 
 use crate::foreign::assembly::{Assembly, Join};
 use crate::foreign::body::{Body, Mass, SdfModel, is_possible};
+use crate::foreign::frames::{Frame, OWN};
 use crate::foreign::geometry::{Shapes, report_volume};
 use crate::foreign::xml;
 use actcheck_base::{Diagnostic, Diagnostics, SourceSpan};
@@ -27,13 +28,14 @@ pub(crate) fn read(tree: &ModelTree, shapes: &mut Shapes) -> (Option<SdfModel>, 
         let solids = members.iter().flat_map(|link| &tree.links[*link].solids);
         body.friction = friction(&solids.collect::<Vec<_>>(), found);
     };
-    let body = body(tree, shapes, false, material, &mut found);
+    let (body, frames) = body(tree, shapes, false, material, &mut found);
     if found.has_errors() {
         return (None, found);
     }
     let digest = shapes.digest.clone().finish();
     let model = SdfModel {
         body,
+        frames,
         pose: Isometry3::identity(),
         is_static: false,
         digest,
@@ -42,14 +44,15 @@ pub(crate) fn read(tree: &ModelTree, shapes: &mut Shapes) -> (Option<SdfModel>, 
 }
 
 /// Makes the body of a tree, with those that joints move, and reports its faults. `is_static`: it
-/// never moves. `material` gives a body its material; its links are named by their indices.
+/// never moves. `material` gives a body its material; its links are named by their indices. Also
+/// returns the frames of the links, each with the body that carries it.
 pub(crate) fn body(
     tree: &ModelTree,
     shapes: &mut Shapes,
     is_static: bool,
     mut material: impl FnMut(&[usize], &mut Body, &mut Diagnostics),
     found: &mut Diagnostics,
-) -> Body {
+) -> (Body, BTreeMap<String, Frame>) {
     let index: BTreeMap<&str, usize> = tree
         .links
         .iter()
@@ -102,7 +105,21 @@ pub(crate) fn body(
         material(&own.collect::<Vec<_>>(), body, found);
     }
     let names: Vec<&str> = tree.links.iter().map(|link| link.name.as_str()).collect();
-    assembly.attach(bodies, &names, found)
+    let (whole, parts) = assembly.attach(bodies, &names, found);
+    let mut frames = BTreeMap::new();
+    for (idx, (name, at)) in names.iter().zip(&places).enumerate() {
+        let body = assembly.body_of(idx);
+        let carrier = match parts[body] {
+            Some(part) => Some(whole.moving[part].name.clone()),
+            None if body == 0 => Some(OWN.to_owned()),
+            None => None,
+        };
+        if let (Some(pose), Some(link)) = (at, carrier) {
+            let (pose, link) = (*pose, Some(link));
+            frames.insert((*name).to_owned(), Frame { pose, link });
+        }
+    }
+    (whole, frames)
 }
 
 /// The friction of a body: the largest of its shapes, as one number.

@@ -6,6 +6,7 @@ use std::path::Path;
 use nalgebra::Isometry3;
 
 use crate::foreign::body::{Body, Role, SdfModel};
+use crate::foreign::frames::Frame;
 use crate::foreign::geometry::Shapes;
 use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
@@ -31,9 +32,9 @@ pub(crate) fn read(
     let mut shapes = Shapes::new(lookup, path);
     shapes.digest.update(source.text.as_bytes());
     let root = document.root_element();
-    let mut body = Body::default();
+    let (mut body, mut frames) = (Body::default(), BTreeMap::new());
     if root.tag_name().name() == "robot" {
-        body = read_object(root, &mut shapes, &mut reader);
+        (body, frames) = read_object(root, &mut shapes, &mut reader);
         if body.parts.is_empty() && !reader.found.has_errors() {
             let message = "the object has no solid shape: none of its links has a `<collision>`";
             let help = "give a link a `<collision>`; a `<visual>` does not collide";
@@ -60,6 +61,7 @@ pub(crate) fn read(
         Some(SdfModel {
             is_static: body.fixed,
             body,
+            frames,
             pose: Isometry3::identity(),
             digest,
         }),
@@ -67,12 +69,16 @@ pub(crate) fn read(
     )
 }
 
-fn read_object(root: Node, shapes: &mut Shapes, reader: &mut Reader) -> Body {
+fn read_object(
+    root: Node,
+    shapes: &mut Shapes,
+    reader: &mut Reader,
+) -> (Body, BTreeMap<String, Frame>) {
     urdf_extra::ROBOT.check(root, reader);
     let extras = Extras::of(root, reader);
     let read = urdf_tree::read(root, reader);
     if !read.is_whole {
-        return Body::default();
+        return (Body::default(), BTreeMap::new());
     }
     let mut tree = read.tree;
     let named = |element: &'static str| {
@@ -96,10 +102,10 @@ fn read_object(root: Node, shapes: &mut Shapes, reader: &mut Reader) -> Body {
         }
         warn_of_usual_friction(body, xml::span(root), reader);
     };
-    let body = tree_object::body(&tree, shapes, extras.is_static, material, &mut found);
+    let (body, frames) = tree_object::body(&tree, shapes, extras.is_static, material, &mut found);
     reader.found.extend(found);
     refuse_self_collision(&body, extras.collides, reader);
-    body
+    (body, frames)
 }
 
 /// Reports a joint that can't move a part of an object (W035). One with the range 0 to 0 is fixed.
