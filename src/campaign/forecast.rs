@@ -174,7 +174,8 @@ impl Env {
             joints.join("`, `"),
             robot.name,
         );
-        let help = "write the largest force or torque of each joint into `<limit effort=\"…\">` of the URDF";
+        let help = "state the largest force or torque of each joint in the robot's file: in URDF `<limit effort=\"…\">`, in SDF \
+             `<effort>`, in MJCF the `forcerange` of its actuator";
         Some(
             self.campaign
                 .warning("S075", "robot.profile", message)
@@ -194,8 +195,8 @@ impl Env {
             joints.join("`, `"),
             robot.name,
         );
-        let help =
-            "write the largest speed of each joint into `<limit velocity=\"…\">` of the URDF";
+        let help = "state the largest speed of each joint in the robot's file: in URDF `<limit velocity=\"…\">`, in SDF \
+             `<velocity>`";
         Some(
             self.campaign
                 .warning("S075", "robot.profile", message)
@@ -213,7 +214,7 @@ impl Env {
                 joint.name, robot.name, joint.effort, joint.weight,
             );
             let help = "nothing, if the robot has springs or counterweights; otherwise correct the joint's `effort`, or \
-                        the masses of the links, in the URDF";
+                        the masses of the links, in the robot's file";
             self.campaign
                 .warning("S074", "robot.profile", message)
                 .help(help)
@@ -260,7 +261,7 @@ impl Env {
             model.name, robot.grip_force_n,
         );
         let help = "every pick of it will fail: reduce the object's mass, or raise `grip_force_n` in the robot's profile, or \
-             the `effort` of the finger joints in the URDF if that limits it";
+             the `effort` of the finger joints in its file if that limits it";
         Some(self.campaign.warning("S072", key, message).help(help))
     }
 
@@ -353,8 +354,7 @@ impl Env {
              `{surface}`",
             model.name, pick.weakest, pick.payload_kg,
         );
-        let help =
-            "reduce the object's mass or `mass_scale`, or correct the joint's `effort` in the URDF";
+        let help = "reduce the object's mass or `mass_scale`, or correct the joint's `effort` in the robot's file";
         Some(self.campaign.warning("S072", key, message).help(help))
     }
 

@@ -373,7 +373,7 @@ impl Unread {
 /// Returns the text of a robot's file; that of xacro after expansion.
 fn text_of(files: &Files, path: &Path, inputs: Inputs<'_>) -> Result<Source, Unread> {
     let text = files.read(path).map_err(|reason| {
-        let message = format!("cannot read the URDF {}: {reason}", path.display());
+        let message = format!("cannot read the robot {}: {reason}", path.display());
         Unread {
             code: "W010",
             fault: Unexpanded {

@@ -34,7 +34,7 @@ impl Roles {
                 table.fault(
                     "W050",
                     link.span.clone(),
-                    format!("the URDF has no link `{}`", link.value),
+                    format!("the robot has no link `{}`", link.value),
                     help,
                 );
             }
@@ -134,7 +134,7 @@ fn check_joint(
         table.fault(
             "W050",
             joint.span.clone(),
-            format!("the URDF has no joint `{name}`"),
+            format!("the robot has no joint `{name}`"),
             help,
         );
         return;

@@ -7,7 +7,7 @@ use actcheck_base::Diagnostic;
 #[non_exhaustive]
 pub enum RobotError {
     /// The URDF can't be used.
-    #[error("{name} is not a usable URDF: {reason}")]
+    #[error("{name} is not a usable robot: {reason}")]
     Urdf {
         /// The URDF's path.
         name: String,
@@ -132,7 +132,7 @@ impl RobotError {
     pub fn diagnostic(&self) -> Diagnostic {
         match self {
             Self::Urdf { .. } => Diagnostic::error("W020", self.to_string())
-                .help("the profile's `urdf` must name a URDF file with one tree of links"),
+                .help("the profile's `urdf` must name a file of URDF, SDF or MJCF with one tree of links"),
             Self::Missing { help, .. } => Diagnostic::error("W021", self.to_string()).help(help.clone()),
             Self::Unsupported { .. } => Diagnostic::error("W022", self.to_string()).help(
                 "use fixed, revolute, continuous or prismatic joints, and boxes, cylinders, spheres, capsules or \

@@ -90,7 +90,7 @@ const CODES_W: &[Code] = &[
         "W030",
         "a model of another program can't be read",
         "its folder lacks `model.config` or the SDF file that it names",
-        "name a folder with both, or a URDF file",
+        "name a folder with both, or a file of URDF or MJCF",
     ),
     code(
         "W031",
@@ -186,13 +186,13 @@ const CODES_W: &[Code] = &[
     ),
     code(
         "W050",
-        "the URDF has no such link or joint",
+        "the robot has no such link or joint",
         "a name in the robot profile is misspelt",
         "take the suggested name",
     ),
     code(
         "W051",
-        "the links of a URDF don't form one tree",
+        "the links of a model don't form one tree",
         "a link has two parents or none, links form a cycle, or names are used twice",
         "correct the joints; the help names the fault",
     ),
@@ -216,9 +216,9 @@ const CODES_W: &[Code] = &[
     ),
     code(
         "W055",
-        "an XML file of a model exceeds a limit of its structure",
-        "a damaged or malicious file: entities that grow, hundreds of attributes or namespaces, thousands of levels, copies of copies",
-        "don't use the file, or export the model again",
+        "a model exceeds a limit of its structure",
+        "a damaged or malicious file: entities that grow, hundreds of attributes or namespaces, thousands of levels, copies of copies, or models that include each other many times",
+        "don't use the file, include fewer models, or export the model again",
     ),
     code(
         "W056",

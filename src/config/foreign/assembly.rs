@@ -1,9 +1,10 @@
 //! The bodies that the links of an object form: those joined by fixed joints move as one, and all
 //! other joints move a body.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 
 use crate::foreign::body::{Body, MovingBody};
+use crate::foreign::words::words_at;
 use crate::foreign::xml;
 use actcheck_base::{Diagnostic, Diagnostics, SourceSpan};
 use actcheck_data::PartJoint;
@@ -53,24 +54,23 @@ impl Assembly {
             .iter()
             .filter_map(|join| join.joint.map(|joint| (join, joint)))
             .collect();
-        let movers = |group: usize| {
-            moving
-                .iter()
-                .filter(|(join, _)| groups[join.child] == group)
-                .count()
-        };
-        for (join, _) in &moving {
-            if movers(groups[join.child]) > 1 {
-                let message = "two joints move the same links";
-                let help = "links form one tree: remove one of the joints";
-                found.push(fault(Diagnostic::error("W035", message), &join.place, help));
-                return rigid;
-            }
+        let mut driven = BTreeSet::new();
+        let twice = moving
+            .iter()
+            .filter(|(join, _)| !driven.insert(groups[join.child]));
+        let twice: Vec<&Join> = twice.map(|(join, _)| *join).collect();
+        for join in &twice {
+            let message = "two joints move the same links";
+            let help = "links form one tree: remove one of the joints";
+            found.push(fault(Diagnostic::error("W035", message), &join.place, help));
+        }
+        if !twice.is_empty() {
+            return rigid;
         }
         // All links that no joint moves are the object itself.
         let mut bodies: Vec<Option<usize>> = groups
             .iter()
-            .map(|group| (movers(*group) == 0).then_some(0))
+            .map(|group| (!driven.contains(group)).then_some(0))
             .collect();
         let (mut moved, mut left): (Vec<Moved>, VecDeque<_>) =
             (Vec::new(), moving.iter().collect());
@@ -119,20 +119,21 @@ impl Assembly {
 
     /// Attaches the bodies that joints move to the first. `names` are those of the links. A body
     /// without shapes is left out with a warning (W036), or refused if it carries others (W035).
+    /// Also returns the moving part that each body became; `None` for the first and those left out.
     pub(crate) fn attach(
         &self,
         bodies: Vec<Body>,
         names: &[&str],
         found: &mut Diagnostics,
-    ) -> Body {
+    ) -> (Body, Vec<Option<usize>>) {
         let mut bodies = bodies.into_iter();
         let mut whole = bodies.next().unwrap_or_default();
-        // The part that each body became.
         let mut parts: Vec<Option<usize>> = vec![None];
         for (idx, (moved, body)) in self.moved.iter().zip(bodies).enumerate() {
             let link = names[moved.link];
             if body.parts.is_empty() {
-                let message = format!("the link `{link}` has no `<collision>`");
+                let solid = words_at(&moved.place).solid;
+                let message = format!("the link `{link}` has no {solid}");
                 if self.moved.iter().any(|other| other.carrier == idx + 1) {
                     let help = "a link that a joint moves and that carries others needs one";
                     found.push(fault(
@@ -160,7 +161,7 @@ impl Assembly {
                 joint: moved.joint,
             });
         }
-        whole
+        (whole, parts)
     }
 }
 

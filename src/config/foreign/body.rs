@@ -1,9 +1,11 @@
 //! A rigid body read from SDF or URDF, and its conversion to a model.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector3};
 
+use crate::foreign::frames::Frame;
 use actcheck_base::names;
 use actcheck_data::{
     Inertia, MovingPart, ObjectModel, Part, PartJoint, Pose, Shape, Surface, bounds,
@@ -32,6 +34,9 @@ pub(crate) enum Role {
 /// A model read from SDF or URDF.
 pub(crate) struct SdfModel {
     pub(crate) body: Body,
+    /// Frames of its links by their names, with the names of the bodies that carry them; empty in
+    /// SDF, where a model that includes this one has its links.
+    pub(crate) frames: BTreeMap<String, Frame>,
     /// Pose of the model's origin in the file.
     pub(crate) pose: Isometry3<f64>,
     /// Whether the file says that it never moves.

@@ -57,6 +57,22 @@ pub(crate) fn refuse_unless(parent: Node, name: &str, usual: f64, why: &str, rea
     }
 }
 
+/// Warns of a number that is not read (W036), if it is not the usual one.
+pub(crate) fn warn_unless(parent: Node, name: &str, usual: f64, why: &str, reader: &mut Reader) {
+    if let Some(node) = xml::child(parent, name)
+        && let Some(value) = reader.number(node, Bound::Finite)
+        && value != usual
+    {
+        let message = format!("`<{name}>` of {value} is ignored: {why}");
+        reader.warning(
+            "W036",
+            node,
+            message,
+            format!("write {usual} if that is meant"),
+        );
+    }
+}
+
 /// Reports a switch that would change the model (W035) if it is not the usual one.
 pub(crate) fn refuse_switch(parent: Node, name: &str, usual: bool, why: &str, reader: &mut Reader) {
     if let Some(node) = xml::child(parent, name)

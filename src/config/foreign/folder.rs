@@ -8,6 +8,7 @@ use crate::foreign::body::{Role, SdfModel};
 use crate::foreign::footprint::turned;
 use crate::foreign::frames::Included;
 use crate::foreign::geometry::Shapes;
+use crate::foreign::inclusions::Inclusions;
 use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::{Lookup, beside, spellings};
 use crate::foreign::nested::{SubModel, Tree};
@@ -141,7 +142,7 @@ impl Opened {
         model.map(|model| (model, said.clone())).ok_or(said)
     }
 
-    /// Reads a model that `depth` others include, and that never moves if `fixed`.
+    /// Reads a model that others include, and that never moves if `fixed`.
     ///
     /// # Errors
     /// As [`read`].
@@ -149,15 +150,16 @@ impl Opened {
         &self,
         lookup: &Lookup,
         (role, fixed): (Role, bool),
-        depth: usize,
+        inclusions: Inclusions,
     ) -> Result<SubModel, Diagnostics> {
         if self.format == Format::Sdf {
             let (model, said) =
-                sdf::read_included(&self.text, &self.path, lookup, (role, fixed), depth);
+                sdf::read_included(&self.text, &self.path, lookup, (role, fixed), inclusions);
             return model.ok_or(said);
         }
         let (model, _) = self.body(lookup)?;
-        let (tree, frames) = Tree::of_body(model.body, fixed);
+        let (tree, mut frames) = Tree::of_body(model.body, fixed);
+        frames.extend(model.frames);
         let stem = self.path.file_stem();
         Ok(SubModel {
             tree,
@@ -221,19 +223,26 @@ pub(crate) fn name_in(uri: &str) -> String {
     }
 }
 
-/// Reads the model that the `<uri>` of an `<include>` names, which `depth` others include. `known`
-/// are the names that the user may have meant. The model never moves if `fixed`. Reports W040 and returns `None` if the model is
-/// missing or has faults.
+/// A file with elements that include models.
+pub(crate) struct Including<'a> {
+    pub(crate) path: &'a Path,
+    pub(crate) lookup: &'a Lookup<'a>,
+    pub(crate) inclusions: &'a Inclusions,
+}
+
+/// Reads the model that the `<uri>` of an `<include>` in a file names. `known` are the names that
+/// the user may have meant. The model never moves if `fixed`. Reports W040 and returns `None` if the
+/// model is missing or has faults.
 pub(crate) fn included<'a>(
     uri: Node,
-    lookup: &Lookup,
+    file: &Including,
     (role, fixed): (Role, bool),
-    depth: usize,
     known: impl Iterator<Item = &'a str>,
     reader: &mut Reader,
 ) -> Option<SubModel> {
+    file.inclusions.check_room(uri, reader)?;
     let name = name_in(xml::text(uri));
-    let Some(found) = named(&name, lookup) else {
+    let Some(found) = meant(xml::text(uri), file.path, file.lookup) else {
         let message = format!("the model `{name}` is missing");
         let known: Vec<&str> = known.collect();
         let help = match known.is_empty() {
@@ -243,8 +252,15 @@ pub(crate) fn included<'a>(
         reader.error("W040", uri, message, help);
         return None;
     };
-    let model =
-        Opened::of(&found, lookup).and_then(|opened| opened.included(lookup, (role, fixed), depth));
+    let model = match Opened::of(&found, file.lookup) {
+        Ok(opened) => {
+            let inclusions =
+                file.inclusions
+                    .enter(file.path, &opened.path, &opened.text, uri, reader)?;
+            opened.included(file.lookup, (role, fixed), inclusions)
+        }
+        Err(faults) => Err(faults),
+    };
     match model {
         Ok(model) => Some(model),
         Err(faults) => {
@@ -279,22 +295,43 @@ pub(crate) fn text_of(
     file: &Path,
     lookup: &Lookup,
 ) -> Result<Option<ModelText>, Diagnostics> {
-    let as_path = || {
-        let path = lookup.resolve(uri, file).ok()?;
-        let found = model_file(lookup.files, &path).or_else(|| {
-            let is_file = is_model(lookup.files, &path) && lookup.files.read(&path).is_ok();
-            is_file.then(|| path.clone())
-        })?;
-        Some(Found {
-            name: uri.to_owned(),
-            path: found,
-        })
-    };
-    let Some(found) = named(&name_in(uri), lookup).or_else(as_path) else {
+    let Some(found) = meant(uri, file, lookup) else {
         return Ok(None);
     };
     let Opened { path, text, .. } = Opened::of(&found, lookup)?;
     Ok(Some(ModelText { path, source: text }))
+}
+
+/// Finds the model that a URI in a file means. One without a scheme is first relative to the file,
+/// and then a path in the folders of models.
+fn meant(uri: &str, file: &Path, lookup: &Lookup) -> Option<Found> {
+    let by_name = || named(&name_in(uri), lookup);
+    match is_path(uri) {
+        true => at_path(uri, file, lookup).or_else(by_name),
+        false => by_name().or_else(|| at_path(uri, file, lookup)),
+    }
+}
+
+/// Whether a URI without a scheme means a model beside the file that contains it.
+pub(crate) fn is_beside(uri: &str, file: &Path, lookup: &Lookup) -> bool {
+    is_path(uri) && at_path(uri, file, lookup).is_some()
+}
+
+fn is_path(uri: &str) -> bool {
+    !uri.contains("://")
+}
+
+/// Finds the model whose folder or file is at the path of a URI.
+fn at_path(uri: &str, file: &Path, lookup: &Lookup) -> Option<Found> {
+    let path = lookup.resolve(uri, file).ok()?;
+    let found = model_file(lookup.files, &path).or_else(|| {
+        let is_file = is_model(lookup.files, &path) && lookup.files.read(&path).is_ok();
+        is_file.then(|| path.clone())
+    })?;
+    Some(Found {
+        name: uri.to_owned(),
+        path: found,
+    })
 }
 
 /// Finds a model by its path in the folders. Names of web addresses may differ from folders in case
@@ -392,7 +429,7 @@ fn unreadable(path: &Path, reason: &FileFault) -> Diagnostic {
         "W030",
         format!("cannot read the model {}: {reason}", path.display()),
     )
-    .help("a model is a folder with `model.config` and the SDF file that it names, or a URDF file")
+    .help("a model is a folder with `model.config` and the SDF file that it names, or a file of URDF or MJCF")
 }
 
 /// Returns the SDF file named by a `model.config`; if there are several, that of the newest

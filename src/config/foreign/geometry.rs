@@ -1,9 +1,10 @@
-//! Shapes in SDF and URDF.
+//! Shapes in SDF, and those of trees.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 use std::path::Path;
 
+use crate::foreign::inclusions::Inclusions;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::mesh_file;
 use crate::foreign::xml::{self, Bound, Node, Reader};
@@ -17,8 +18,8 @@ pub(crate) struct Shapes<'a> {
     pub(crate) path: &'a Path,
     /// Digest of the mesh files and of included models.
     pub(crate) digest: Digest,
-    /// Number of models that include this file's model.
-    pub(crate) depth: usize,
+    /// The models that include this file's model.
+    pub(crate) inclusions: Inclusions,
     /// Warnings about mesh files without a text, each of which is given once.
     pub(crate) warned: BTreeSet<String>,
 }
@@ -32,7 +33,7 @@ impl<'a> Shapes<'a> {
             lookup,
             path,
             digest: Digest::new(),
-            depth: 0,
+            inclusions: Inclusions::default(),
             warned: BTreeSet::new(),
         }
     }
@@ -44,10 +45,7 @@ impl<'a> Shapes<'a> {
         if kind.tag_name().name() == "mesh" {
             return self.sdf_mesh(kind, reader);
         }
-        primitive(kind, reader, |name, reader| {
-            let node = reader.required(kind, name)?;
-            Some((node, xml::text(node)))
-        })
+        primitive(kind, reader)
     }
 
     fn sdf_mesh(&mut self, mesh: Node, reader: &mut Reader) -> Option<Shape> {
@@ -72,23 +70,7 @@ impl<'a> Shapes<'a> {
         self.mesh(uri, xml::text(uri), scale, reader)
     }
 
-    /// Reads the shape of a URDF `<geometry>`. Returns `None` after it has reported a fault.
-    pub(crate) fn urdf(&mut self, geometry: Node, reader: &mut Reader) -> Option<Shape> {
-        let kind = kind_of(geometry, reader)?;
-        if kind.tag_name().name() != "mesh" {
-            return primitive(kind, reader, |name, reader| {
-                Some((kind, reader.attribute(kind, name)?))
-            });
-        }
-        let uri = reader.attribute(kind, "filename")?;
-        let scale = match kind.attribute("scale") {
-            Some(scale) => reader.numbers(kind, scale, Bound::Finite)?,
-            None => [1.0; 3],
-        };
-        self.mesh(kind, uri, scale, reader)
-    }
-
-    pub(crate) fn mesh(
+    fn mesh(
         &mut self,
         node: Node,
         uri: &str,
@@ -107,15 +89,21 @@ impl<'a> Shapes<'a> {
         scale: [f64; 3],
         found: &mut Diagnostics,
     ) -> Option<Shape> {
-        let at_place = |fault: Diagnostic| fault.at(&place.source, xml::tag(place));
         if scale.contains(&0.0) {
-            let fault = Diagnostic::error("W034", "the mesh's scale must not be 0");
-            found.push(at_place(fault).help("write 1 for the file's own size"));
+            let fault = Diagnostic::error("W034", "the mesh's scale must not be 0")
+                .at(&place.source, xml::tag(place));
+            found.push(fault.help("write 1 for the file's own size"));
             return None;
         }
+        let mesh = self.unscaled(place, uri, found)?.scaled(scale);
+        check_reach(&mesh, [1.0; 3], place, found).then(|| solid_of(mesh))
+    }
+
+    /// Reads a mesh as its file has it. Returns `None` after it has reported a fault at a place.
+    fn unscaled(&mut self, place: &SourceSpan, uri: &str, found: &mut Diagnostics) -> Option<Mesh> {
         // A fault without a source, as of a binary mesh file, is reported where the file is named.
         let placed = |fault: Diagnostic| match fault.source {
-            None => at_place(fault),
+            None => fault.at(&place.source, xml::tag(place)),
             Some(_) => fault,
         };
         let file = match self.mesh_file(uri) {
@@ -130,31 +118,10 @@ impl<'a> Shapes<'a> {
             warning.source.is_some() || self.warned.insert(warning.message.clone())
         });
         found.extend(warnings.map(placed).collect());
-        let mesh = file.mesh.scaled(scale);
-        let longest = mesh
-            .vertices
-            .iter()
-            .flatten()
-            .fold(0.0_f64, |most, along| most.max(along.abs()));
-        if longest > xml::LONGEST {
-            let message = format!(
-                "the mesh reaches {longest:.0} m from its origin, which is beyond {} m",
-                xml::LONGEST
-            );
-            let help = "lengths are in metres: write `scale` 0.001 for millimetres";
-            found.push(at_place(Diagnostic::error("W034", message)).help(help));
-            return None;
-        }
-        // With the backs of its faces, a mesh has no volume.
-        let mesh = if mesh.volume() > LEAST_VOLUME {
-            mesh
-        } else {
-            mesh.one_sided()
-        };
-        Some(Shape::Mesh { mesh })
+        Some(file.mesh)
     }
 
-    /// Reads the mesh of a solid of a tree, if it has one that is not known yet.
+    /// Reads the mesh of a solid of a tree, if it has one that is not known yet. It is not scaled.
     pub(crate) fn load(
         &mut self,
         solid: &TreeSolid,
@@ -162,20 +129,22 @@ impl<'a> Shapes<'a> {
         meshes: &mut BTreeMap<String, Vec<Shape>>,
         found: &mut Diagnostics,
     ) {
-        let TreeGeometry::Mesh { file, .. } = &solid.geometry else {
+        let TreeGeometry::Mesh { file, scale } = &solid.geometry else {
             return;
         };
-        if meshes.contains_key(file) {
-            return;
+        if !meshes.contains_key(file) {
+            let mesh = match tree.inline_meshes.get(file) {
+                Some(mesh) => {
+                    self.digest.update(mesh.digest().as_bytes());
+                    Some(Shape::Mesh { mesh: mesh.clone() })
+                }
+                None => self.unscaled(&solid.place, file, found).map(solid_of),
+            };
+            meshes.extend(mesh.map(|shape| (file.clone(), vec![shape])));
         }
-        let shape = match tree.inline_meshes.get(file) {
-            Some(mesh) => {
-                self.digest.update(mesh.digest().as_bytes());
-                Some(Shape::Mesh { mesh: mesh.clone() })
-            }
-            None => self.mesh_at(&solid.place, file, [1.0; 3], found),
-        };
-        meshes.extend(shape.map(|shape| (file.clone(), vec![shape])));
+        if let Some(Shape::Mesh { mesh }) = meshes.get(file).and_then(|shapes| shapes.first()) {
+            check_reach(mesh, *scale, &solid.place, found);
+        }
     }
 
     fn mesh_file(&self, uri: &str) -> Result<mesh_file::MeshFile, Diagnostics> {
@@ -187,6 +156,35 @@ impl<'a> Shapes<'a> {
     }
 }
 
+/// Returns the shape of a mesh. With the backs of its faces, it would have no volume.
+fn solid_of(mesh: Mesh) -> Shape {
+    let mesh = match mesh.volume() > LEAST_VOLUME {
+        true => mesh,
+        false => mesh.one_sided(),
+    };
+    Shape::Mesh { mesh }
+}
+
+/// Whether a scaled mesh is not too large. Otherwise reports W034 at a place.
+fn check_reach(mesh: &Mesh, scale: [f64; 3], place: &SourceSpan, found: &mut Diagnostics) -> bool {
+    let along = |vertex: &[f64; 3]| {
+        let scaled = vertex.iter().zip(&scale);
+        scaled.fold(0.0_f64, |most, (along, by)| most.max((along * by).abs()))
+    };
+    let longest = mesh.vertices.iter().map(along).fold(0.0, f64::max);
+    if longest <= xml::LONGEST {
+        return true;
+    }
+    let message = format!(
+        "the mesh reaches {longest:.0} m from its origin, which is beyond {} m",
+        xml::LONGEST
+    );
+    let help = "lengths are in metres: write `scale` 0.001 for millimetres";
+    let fault = Diagnostic::error("W034", message).at(&place.source, xml::tag(place));
+    found.push(fault.help(help));
+    false
+}
+
 /// Returns the element that determines the kind of a geometry.
 pub(crate) fn kind_of<'n>(geometry: Node<'n>, reader: &mut Reader) -> Option<Node<'n>> {
     let kind = geometry.children().find(Node::is_element);
@@ -196,13 +194,12 @@ pub(crate) fn kind_of<'n>(geometry: Node<'n>, reader: &mut Reader) -> Option<Nod
     kind
 }
 
-/// Reads a primitive shape. `written` finds its parameters by name: elements in SDF, attributes in
-/// URDF.
-fn primitive<'n>(
-    kind: Node<'n>,
-    reader: &mut Reader,
-    written: impl Fn(&str, &mut Reader) -> Option<(Node<'n>, &'n str)>,
-) -> Option<Shape> {
+/// Reads a primitive shape of SDF.
+fn primitive(kind: Node, reader: &mut Reader) -> Option<Shape> {
+    let written = |name: &str, reader: &mut Reader| {
+        let node = reader.required(kind, name)?;
+        Some((node, xml::text(node)))
+    };
     let number = |reader: &mut Reader, name: &str| {
         let (node, text) = written(name, reader)?;
         reader

@@ -24,8 +24,9 @@ pub(crate) struct Lookup<'a> {
 }
 
 impl Lookup<'_> {
-    /// Returns the path of a URI in a file. A URI without a scheme is relative to that file. If the
-    /// path as written does not exist, its other [`spellings`] are tried.
+    /// Returns the path of a URI in a file. A URI without a scheme is relative to that file or, if
+    /// nothing is there, to one of the folders. If the path as written does not exist, its other
+    /// [`spellings`] are tried.
     ///
     /// # Errors
     /// [`UriFault`] if the file does not exist or the scheme is not supported.
@@ -73,7 +74,14 @@ impl Lookup<'_> {
         if path.starts_with('/') && !self.exists(Path::new(path)) && self.exists(&inside) {
             return inside;
         }
-        self.find_end(path).unwrap_or_else(|| beside.join(path))
+        let place = beside.join(path);
+        if path.starts_with('/') {
+            return self.find_end(path).unwrap_or(place);
+        }
+        match self.exists(&place) {
+            true => place,
+            false => self.find(path).unwrap_or(place),
+        }
     }
 
     fn find(&self, path: &str) -> Option<PathBuf> {

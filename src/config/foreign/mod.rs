@@ -17,6 +17,9 @@ mod geometry;
 mod gltf;
 mod gltf_document;
 mod hull;
+#[cfg(test)]
+mod included_tests;
+mod inclusions;
 pub(crate) mod lenient;
 mod lookup;
 mod mesh_file;
@@ -38,6 +41,7 @@ pub(crate) mod robot_shapes;
 
 mod geom_mass;
 mod sdf;
+mod sdf_ends;
 mod sdf_inertial;
 mod sdf_joint;
 mod sdf_link;
@@ -60,6 +64,7 @@ mod urdf;
 mod urdf_extra;
 mod urdf_tree;
 mod urdf_writer;
+mod words;
 pub(crate) mod world;
 mod world_state;
 mod xml;

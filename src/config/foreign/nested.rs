@@ -7,10 +7,12 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use crate::foreign::assembly::{Assembly, Join};
 use crate::foreign::body::{Body, Role};
 use crate::foreign::elements::Children;
-use crate::foreign::folder;
+use crate::foreign::folder::{self, Including};
 use crate::foreign::frames::{Frame, Included, OWN};
 use crate::foreign::geometry::Shapes;
+use crate::foreign::inclusions::check_size;
 use crate::foreign::sdf::is_static;
+use crate::foreign::sdf_ends::{JointEnd, WrittenPart, last_name};
 use crate::foreign::sdf_pose::{self, pose, prefix};
 use crate::foreign::sdf_surface::{
     Surface, prefixed, refuse_self_collision, warn_of_usual_friction,
@@ -20,8 +22,6 @@ use crate::foreign::{sdf_joint, sdf_link};
 use actcheck_base::Span;
 use actcheck_data::PartJoint;
 
-/// Deepest inclusion of models: deeper ones include themselves.
-pub(super) const DEEPEST: usize = 8;
 /// Of the elements that are read, `allow_auto_disable`, `name` and `origin` have no effect.
 const MODEL: Children = Children {
     read: &[
@@ -104,21 +104,12 @@ pub(crate) struct SubModel {
     pub(crate) digest: String,
 }
 
-/// A link or joint of a model, before it is read.
-struct Written<'a> {
-    node: Node<'a>,
-    /// Pose of its model in the outermost one.
-    model: Isometry3<f64>,
-    /// The beginning of the names in its model.
-    prefix: String,
-}
-
 /// The elements of a model and of the models nested in it, and the models that they include.
 #[derive(Default)]
 struct Elements<'a> {
-    links: Vec<Written<'a>>,
-    joints: Vec<Written<'a>>,
-    includes: Vec<Written<'a>>,
+    links: Vec<WrittenPart<'a>>,
+    joints: Vec<WrittenPart<'a>>,
+    includes: Vec<WrittenPart<'a>>,
     /// A switch by which links of a model that can move collide with each other.
     collides: Option<Span>,
     models: BTreeMap<usize, SubModel>,
@@ -208,7 +199,7 @@ impl Tree {
 
     fn read_link(
         &mut self,
-        link: &Written,
+        link: &WrittenPart,
         (role, stays): (Role, bool),
         shapes: &mut Shapes,
         reader: &mut Reader,
@@ -231,7 +222,10 @@ impl Tree {
                 continue;
             };
             shapes.digest.update(model.digest.as_bytes());
-            if let Some(own) = pose(include.node, reader) {
+            let n_links = self.links.len() + model.tree.links.len();
+            if let Some(own) = pose(include.node, reader)
+                && check_size(n_links, include.node, reader).is_some()
+            {
                 let prefix = format!("{}{}", include.prefix, prefix(include.node, reader));
                 self.add(model.tree, &(include.model * own), &prefix, include.node);
             }
@@ -241,6 +235,9 @@ impl Tree {
     /// Adds a model at a pose. Its places in its own file become that of the `<include>`.
     fn add(&mut self, other: Self, at: &Isometry3<f64>, prefix: &str, include: Node) {
         let first = self.links.len();
+        if other.collides.is_some() && self.collides.is_none() {
+            self.collides = Some(xml::span(include));
+        }
         self.links.extend(other.links.into_iter().map(|mut link| {
             link.body.transform(at);
             link.body.fixed = self.fixed;
@@ -266,8 +263,8 @@ impl Tree {
             }));
     }
 
-    /// Reads a joint of a model that can move. Reports W035 if it does not connect links.
-    fn read_joint(&self, joint: &Written, reader: &mut Reader) -> Option<Joint> {
+    /// Reads a joint of a model that can move. Reports W051 if it does not connect links.
+    fn read_joint(&self, joint: &WrittenPart, reader: &mut Reader) -> Option<Joint> {
         let node = joint.node;
         sdf_joint::JOINT.check(node, reader);
         let is_rigid = sdf_joint::is_rigid(node);
@@ -275,20 +272,18 @@ impl Tree {
             sdf_joint::kind(node, reader)?;
         }
         let name = node.attribute("name").unwrap_or_default();
+        let links: Vec<&str> = self.links.iter().map(|link| link.name.as_str()).collect();
         let (parent, child) = (
-            self.end(joint, "parent", reader),
-            self.end(joint, "child", reader),
+            joint.end("parent", &links, reader),
+            joint.end("child", &links, reader),
         );
         let (parent, child) = (parent?, child?);
-        let to_world = parent == End::World || child == End::World;
+        let to_world = [parent, child].contains(&JointEnd::World);
         let moves = if is_rigid {
             None
         } else {
-            let usual = match child {
-                End::Link(idx) => self.frame_of_child(joint, idx, reader),
-                End::World => Some(joint.model),
-            };
-            let moves = sdf_joint::read(node, &usual?, &joint.model, reader)?;
+            let usual = joint.frame_of_child(child, |idx| self.links[idx].pose, reader)?;
+            let moves = sdf_joint::read(node, &usual, &joint.model, reader)?;
             if to_world {
                 let message = format!("the joint `{name}` moves the whole model against the world");
                 let help = "connect links of the model itself, or make the joint `fixed`";
@@ -305,51 +300,6 @@ impl Tree {
             moves,
             to_world,
         })
-    }
-
-    /// Returns the frame in which the pose of a joint is: that of its child.
-    fn frame_of_child(
-        &self,
-        joint: &Written,
-        link: usize,
-        reader: &mut Reader,
-    ) -> Option<Isometry3<f64>> {
-        let named = xml::text(xml::child(joint.node, "child")?);
-        let carrier = sdf_pose::carrier(joint.node, named, reader);
-        if carrier.is_none_or(|carrier| carrier == named) {
-            return Some(self.links[link].pose);
-        }
-        Some(joint.model * sdf_pose::frame(joint.node, named, reader)?)
-    }
-
-    /// Returns the link that an end of a joint names, itself or by a frame. Reports W035, and
-    /// returns `None`, if there is no such link.
-    fn end(&self, joint: &Written, which: &str, reader: &mut Reader) -> Option<End> {
-        let element = reader.required(joint.node, which)?;
-        let named = xml::text(element);
-        let position = |name: &str| self.links.iter().position(|link| link.name == name);
-        let carried = sdf_pose::carrier(joint.node, named, reader)
-            .and_then(|link| position(&format!("{}{link}", joint.prefix)));
-        if let Some(idx) = carried {
-            return Some(End::Link(idx));
-        }
-        if named == "world" {
-            return Some(End::World);
-        }
-        // Early versions name links without, or with other, names of models.
-        let last = |name: &str| name.rsplit("::").next().unwrap_or(name).to_owned();
-        let mut alike =
-            (0..self.links.len()).filter(|idx| last(&self.links[*idx].name) == last(named));
-        if let (Some(idx), None) = (alike.next(), alike.next()) {
-            return Some(End::Link(idx));
-        }
-        let name = joint.node.attribute("name").unwrap_or_default();
-        let message = format!(
-            "the joint `{name}` does not connect two links of this model: there is no `{named}`"
-        );
-        let help = "connect links of the model itself, or make the joint `fixed`";
-        reader.error("W035", element, message, help);
-        None
     }
 
     /// Returns the bodies that the links form: one, with those that joints move. Nothing moves in a
@@ -369,7 +319,7 @@ impl Tree {
         let names: Vec<String> = self
             .links
             .iter()
-            .map(|link| last_name(&link.name))
+            .map(|link| last_name(&link.name).to_owned())
             .collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         let mut bodies = assembly.empty_bodies(fixed);
@@ -385,47 +335,57 @@ impl Tree {
         for body in &bodies {
             warn_of_usual_friction(body, self.at.clone(), reader);
         }
-        let body = assembly.attach(bodies, &names, &mut reader.found);
+        let (body, _) = assembly.attach(bodies, &names, &mut reader.found);
         refuse_self_collision(&body, self.collides, reader);
         body
     }
 
-    /// Checks that joints connect all links of a model that can move (W035).
+    /// Checks that joints connect all links of a model that can move (W035): reports each group of
+    /// links that is apart from the first link. A single one without shapes and mass is left out
+    /// (W036).
     fn check_connected(&self, joins: &[Join], reader: &mut Reader) {
-        let mut reached = BTreeSet::from([0]);
-        let mut is_new = true;
-        while is_new {
-            is_new = false;
-            for join in joins {
-                if reached.contains(&join.parent) != reached.contains(&join.child) {
-                    reached.extend([join.parent, join.child]);
-                    is_new = true;
+        let mut reached = BTreeSet::new();
+        for start in 0..self.links.len() {
+            if !reached.insert(start) {
+                continue;
+            }
+            let mut open = vec![start];
+            let mut n_links = 0;
+            while let Some(link) = open.pop() {
+                n_links += 1;
+                for [from, to] in joins
+                    .iter()
+                    .flat_map(|join| [[join.parent, join.child], [join.child, join.parent]])
+                {
+                    if from == link && reached.insert(to) {
+                        open.push(to);
+                    }
                 }
             }
-        }
-        let loose = self.links.iter().enumerate();
-        if let Some((_, link)) = loose.into_iter().find(|(idx, _)| !reached.contains(idx)) {
-            let message = format!("no joint connects `{}` to the other links", link.name);
-            let help = "add a `<joint type=\"fixed\">`, or write `<static>true</static>`";
-            reader.error_at("W035", link.at.clone(), message, help);
+            if start > 0 {
+                self.report_loose(start, n_links, reader);
+            }
         }
     }
-}
 
-/// An end of a joint.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum End {
-    /// A link, by its index.
-    Link(usize),
-    World,
-}
-
-impl End {
-    fn link(self) -> Option<usize> {
-        match self {
-            Self::Link(idx) => Some(idx),
-            Self::World => None,
+    /// Reports a group of links that is apart from the others, by its first link.
+    fn report_loose(&self, first: usize, n_links: usize, reader: &mut Reader) {
+        let link = &self.links[first];
+        let (name, at) = (&link.name, link.at.clone());
+        let body = &link.body;
+        if n_links == 1 && body.parts.is_empty() && body.masses.iter().all(|mass| mass.kg == 0.0) {
+            let message = format!("`{name}` is left out: no joint connects it to the other links");
+            let help = "it has no shape and no mass; a joint of the type `fixed` would hold it";
+            reader.warning_at("W036", at, message, help);
+            return;
         }
+        let others = match n_links {
+            1 => String::new(),
+            _ => format!(" and the {} links joined to it", n_links - 1),
+        };
+        let message = format!("no joint connects `{name}`{others} to the other links");
+        let help = "add a `<joint type=\"fixed\">`, or write `<static>true</static>`";
+        reader.error_at("W035", at, message, help);
     }
 }
 
@@ -443,11 +403,6 @@ impl Joint {
             joint: self.moves,
         })
     }
-}
-
-/// The last part of a link's name.
-fn last_name(name: &str) -> String {
-    name.rsplit("::").next().unwrap_or(name).to_owned()
 }
 
 /// Warns of a joint that does not move in a world.
@@ -495,7 +450,7 @@ impl<'a> Elements<'a> {
             self.collides = self_collision(model, reader);
         }
         for child in model.children().filter(Node::is_element) {
-            let written = |node| Written {
+            let written = |node| WrittenPart {
                 node,
                 model: *at,
                 prefix: prefix.to_owned(),
@@ -515,14 +470,10 @@ impl<'a> Elements<'a> {
                 }
                 "gripper" if role == Role::Object => {
                     let message = "`<gripper>` inside a model is not supported".to_owned();
-                    let help = "leave it out; robots are read from URDF";
+                    let help = "leave it out; `[robot] profile` names robots";
                     reader.error("W035", child, message, help);
                 }
-                "plugin" => {
-                    let message = "the plugin is not run".to_owned();
-                    let help = "forces and motions by plugins are not simulated";
-                    reader.warning("W036", child, message, help);
-                }
+                "plugin" => warn_of_plugin(child, reader),
                 _ => {}
             }
         }
@@ -530,7 +481,7 @@ impl<'a> Elements<'a> {
 
     /// Whether a joint ties the model to the world, and none of its joints moves.
     fn stay(&self) -> bool {
-        let to_world = |joint: &Written| {
+        let to_world = |joint: &WrittenPart| {
             let name = |end| xml::child(joint.node, end).map(xml::text);
             [name("parent"), name("child")].contains(&Some("world"))
         };
@@ -552,6 +503,13 @@ fn self_collision(model: Node, reader: &mut Reader) -> Option<Span> {
         .map(xml::span)
 }
 
+pub(super) fn warn_of_plugin(plugin: Node, reader: &mut Reader) {
+    let message = "the plugin is not run".to_owned();
+    let help = "forces and motions by plugins are not simulated";
+    reader.warning("W036", plugin, message, help);
+}
+
+/// Reports a static model inside one that can move (W035).
 pub(super) fn refuse_static(model: Node, reader: &mut Reader) {
     let message = "a static model inside one that can move can't be simulated".to_owned();
     let help = "remove its `<static>`, or make the whole model static";
@@ -567,18 +525,16 @@ fn include(
     shapes: &mut Shapes,
     reader: &mut Reader,
 ) -> Option<SubModel> {
-    check_include(include, reader);
+    check_include(include, |_| false, reader);
     let uri = reader.required(include, "uri")?;
-    if shapes.depth >= DEEPEST {
-        let message =
-            format!("models are included more than {DEEPEST} levels deep: one includes itself");
-        reader.error("W035", uri, message, "remove the `<include>`");
-        return None;
-    }
     let merged = reader.boolean_attribute(include, "merge")?;
-    let depth = shapes.depth + 1;
+    let file = Including {
+        path: shapes.path,
+        lookup: shapes.lookup,
+        inclusions: &shapes.inclusions,
+    };
     let known = std::iter::empty();
-    let mut model = folder::included(uri, shapes.lookup, (role, fixed), depth, known, reader)?;
+    let mut model = folder::included(uri, &file, (role, fixed), known, reader)?;
     // A merged model leaves `<static>` to the model that includes it.
     let is_static = match xml::child(include, "static") {
         Some(written) => reader.boolean(written)?,
@@ -593,9 +549,13 @@ fn include(
     Some(model)
 }
 
-/// Reports the elements of an `<include>` that are not read.
-pub(crate) fn check_include(include: Node, reader: &mut Reader) {
+/// Reports the elements of an `<include>` that are not read, other than those plugins which
+/// `is_read` accepts.
+pub(crate) fn check_include(include: Node, is_read: impl Fn(Node) -> bool, reader: &mut Reader) {
     INCLUDE.check(include, reader);
+    for plugin in xml::children(include, "plugin").filter(|plugin| !is_read(*plugin)) {
+        warn_of_plugin(plugin, reader);
+    }
     if let Some(params) = prefixed(include, "experimental", "params") {
         let message = "changes of an included model can't be read".to_owned();
         let help = "write the changed model to a folder of its own";

@@ -96,6 +96,7 @@ fn urdf(source: &Source, found: &mut Diagnostics) -> Result<UrdfTree, Diagnostic
         reader.error("W032", root, message, help);
         UrdfTree {
             tree: ModelTree::default(),
+            is_whole: false,
             faults_of_visuals: BTreeMap::new(),
         }
     };
@@ -123,7 +124,7 @@ fn complete(mut bare: Bare, path: &Path, lookup: &Lookup, found: &mut Diagnostic
             shapes.digest.update(numbers.as_bytes());
         }
     }
-    let mends = robot_inertia::check(tree, &meshes, found);
+    let mends = robot_inertia::check(tree, &meshes, bare.is_urdf, found);
     let urdf = if bare.is_urdf {
         bare.text.clone()
     } else {
@@ -144,7 +145,7 @@ fn complete(mut bare: Bare, path: &Path, lookup: &Lookup, found: &mut Diagnostic
         meshes,
         digest: shapes.digest.finish(),
         text: bare.text,
-        mends: if bare.is_urdf { mends } else { Vec::new() },
+        mends,
         tree: bare.tree,
     }
 }

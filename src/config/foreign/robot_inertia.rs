@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use crate::foreign::body::is_possible;
-use crate::foreign::xml;
+use crate::foreign::{root_name, xml};
 use actcheck_base::{Diagnostic, Diagnostics, Span};
 use actcheck_data::{
     LEAST_LINK_KG, ModelTree, Part, Pose, Shape, TreeGeometry, TreeInertial, TreeLink, TreeMotion,
@@ -31,10 +31,12 @@ pub(crate) struct Mend {
 /// Reports the moments of inertia of moving links that no body has: a principal moment of 0 or less
 /// (W034), with which the smallest torque would turn the link infinitely fast, or one that exceeds
 /// the sum of the others (W036). Links that are fixed to each other are one body, as in the
-/// simulation. Returns the proposed changes. `meshes` are the solids by mesh file.
+/// simulation. Returns the proposed changes: those of a URDF that is a whole robot. `meshes` are the
+/// solids by mesh file.
 pub(crate) fn check(
     tree: &ModelTree,
     meshes: &BTreeMap<String, Vec<Shape>>,
+    is_urdf: bool,
     found: &mut Diagnostics,
 ) -> Vec<Mend> {
     let mut mends = Vec::new();
@@ -54,7 +56,9 @@ pub(crate) fn check(
         let massless = whole.symmetric_eigenvalues().min() <= 0.0;
         let impossible = |mass: &&LinkMass| !is_possible(&mass.stated.about_com);
         for mass in masses.iter().filter(impossible) {
-            mends.push(report(mass, &joint.child, massless, meshes, found));
+            let proposed = Proposal::new(mass, meshes);
+            report(mass, &joint.child, (massless, is_urdf), &proposed, found);
+            mends.extend(is_urdf.then(|| proposed.mend(mass)));
         }
     }
     mends
@@ -116,43 +120,31 @@ fn together(masses: &[LinkMass]) -> Matrix3<f64> {
     masses.iter().map(about).sum()
 }
 
-/// Reports one link's moments and proposes those of a box around its shape.
+/// Reports one link's moments, with those of a box around its shape. `can_mend`: they are those of a
+/// URDF that is a whole robot.
 fn report(
     mass: &LinkMass,
     moved: &str,
-    massless: bool,
-    meshes: &BTreeMap<String, Vec<Shape>>,
+    (massless, can_mend): (bool, bool),
+    proposed: &Proposal,
     found: &mut Diagnostics,
-) -> Mend {
+) {
     let name = &mass.link.name;
-    let mut principal: Vec<f64> = mass
-        .stated
-        .about_com
-        .symmetric_eigenvalues()
-        .iter()
-        .copied()
-        .collect();
-    principal.sort_by(|a, b| b.total_cmp(a));
-    let numbers = principal
-        .iter()
-        .map(|moment| short(*moment))
-        .collect::<Vec<_>>()
-        .join(", ");
     let moves = match *name == moved {
         true => "moves".to_owned(),
         false => format!("moves with `{moved}`"),
     };
-    let proposed = Proposal::new(mass, meshes);
-    let element = proposed.element();
     let place = mass.stated.moments_place.as_ref();
     let place = place.unwrap_or(&mass.stated.place);
-    let help = format!(
-        "write those of {}: `{element}`; `actcheck check --mend` writes a mended copy",
-        proposed.origin
-    );
+    let element = proposed.element(root_name(&place.source.text));
+    let mut help = format!("write those of {}: `{element}`", proposed.origin);
+    if can_mend {
+        help.push_str("; `actcheck check --mend` writes a mended copy");
+    }
     let says = format!(
-        "the link `{name}` of {} kg {moves}, but its principal moments of inertia are {numbers} kg·m²",
-        mass.stated.kg
+        "the link `{name}` of {} kg {moves}, but its principal moments of inertia are {} kg·m²",
+        mass.stated.kg,
+        principal(mass)
     );
     let fault = if massless {
         Diagnostic::error("W034", format!("{says}: all must be above 0"))
@@ -161,17 +153,15 @@ fn report(
         Diagnostic::warning("W036", message)
     };
     found.push(fault.at(&place.source, xml::tag(place)).help(help));
-    let change = format!(
-        "`{name}` has the moments of inertia of {} instead of {numbers} kg·m²",
-        proposed.origin
-    );
-    // Missing moments are inserted after `<mass …/>`.
-    let span = match &mass.stated.moments_place {
-        Some(inertia) => inertia.span.clone(),
-        None => mass.stated.place.span.end..mass.stated.place.span.end,
-    };
-    let text = element;
-    Mend { span, text, change }
+}
+
+/// The principal moments of a link as text, the largest first.
+fn principal(mass: &LinkMass) -> String {
+    let moments = mass.stated.about_com.symmetric_eigenvalues();
+    let mut moments: Vec<f64> = moments.iter().copied().collect();
+    moments.sort_by(|a, b| b.total_cmp(a));
+    let moments: Vec<String> = moments.into_iter().map(short).collect();
+    moments.join(", ")
 }
 
 /// The moments of a box around a link's collision shapes.
@@ -211,9 +201,38 @@ impl Proposal {
         }
     }
 
-    fn element(&self) -> String {
+    /// The moments as a file with this root writes them.
+    fn element(&self, root: Option<&str>) -> String {
         let [xx, yy, zz] = self.moments.map(short);
-        format!("<inertia ixx=\"{xx}\" ixy=\"0\" ixz=\"0\" iyy=\"{yy}\" iyz=\"0\" izz=\"{zz}\"/>")
+        match root {
+            Some("mujoco") => format!("diaginertia=\"{xx} {yy} {zz}\""),
+            Some("sdf") => {
+                format!("<inertia><ixx>{xx}</ixx><iyy>{yy}</iyy><izz>{zz}</izz></inertia>")
+            }
+            _ => format!(
+                "<inertia ixx=\"{xx}\" ixy=\"0\" ixz=\"0\" iyy=\"{yy}\" iyz=\"0\" izz=\"{zz}\"/>"
+            ),
+        }
+    }
+
+    /// The change of a URDF that gives a link these moments.
+    fn mend(&self, mass: &LinkMass) -> Mend {
+        let change = format!(
+            "`{}` has the moments of inertia of {} instead of {} kg·m²",
+            mass.link.name,
+            self.origin,
+            principal(mass)
+        );
+        // Missing moments are inserted after `<mass …/>`.
+        let span = match &mass.stated.moments_place {
+            Some(inertia) => inertia.span.clone(),
+            None => mass.stated.place.span.end..mass.stated.place.span.end,
+        };
+        Mend {
+            span,
+            text: self.element(Some("robot")),
+            change,
+        }
     }
 }
 
@@ -272,7 +291,7 @@ mod tests {
         let mut reader = Reader::new(&source);
         let tree = urdf_tree::read(document.root_element(), &mut reader).tree;
         let mut found = Diagnostics::new();
-        let mends = check(&tree, &BTreeMap::new(), &mut found);
+        let mends = check(&tree, &BTreeMap::new(), true, &mut found);
         (found.iter().map(|fault| fault.code).collect(), mends)
     }
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::foreign::words::{Words, words_at};
 use crate::foreign::xml;
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_data::{ModelTree, TreeMotion};
@@ -37,19 +38,20 @@ pub(crate) fn complete_gripper(
             continue;
         }
         let name = &link.name;
+        let Words { solid, visual, .. } = words_at(&link.place);
         let (message, help) = if link.solids.is_empty() {
             (
                 format!(
-                    "the link `{name}` of the gripper has no `<collision>`: its `<visual>` is used instead"
+                    "the link `{name}` of the gripper has no {solid}: each {visual} is used instead"
                 ),
-                "give it a `<collision>` if it has to have another shape",
+                format!("give it a {solid} if it has to have another shape"),
             )
         } else {
             (
                 format!(
-                    "the fingers on the link `{name}` have no `<collision>`: its `<visual>` is used like theirs"
+                    "the fingers on the link `{name}` have no {solid}: each {visual} of the link is used like theirs"
                 ),
-                "give the fingers a `<collision>`, and the hand one that does not include them",
+                format!("give the fingers a {solid}, and the hand one that does not include them"),
             )
         };
         found.push(

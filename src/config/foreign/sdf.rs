@@ -1,10 +1,12 @@
 //! Reads SDF models, Gazebo's format.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::foreign::body::{Role, SdfModel};
 use crate::foreign::frames::Included;
 use crate::foreign::geometry::Shapes;
+use crate::foreign::inclusions::Inclusions;
 use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::nested::{SubModel, Tree};
@@ -35,23 +37,24 @@ pub(crate) fn read(
         Some(SdfModel {
             is_static: body.fixed,
             body,
+            frames: BTreeMap::new(),
             pose,
             digest: shapes.digest.clone().finish(),
         })
     })
 }
 
-/// Reads the model of an SDF file that `depth` others include, as its links, and its faults. It is
-/// `None` if there are errors.
+/// Reads the model of an SDF file that others include, as its links, and its faults. It is `None` if
+/// there are errors.
 pub(crate) fn read_included(
     source: &Source,
     path: &Path,
     lookup: &Lookup,
     (role, fixed): (Role, bool),
-    depth: usize,
+    inclusions: Inclusions,
 ) -> (Option<SubModel>, Diagnostics) {
     let shapes = Shapes {
-        depth,
+        inclusions,
         ..Shapes::new(lookup, path)
     };
     read_with(source, shapes, |model, shapes, reader| {

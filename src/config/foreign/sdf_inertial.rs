@@ -45,7 +45,7 @@ pub(crate) fn read(
     if is_computed {
         computed(inertial, solids, reader)
     } else {
-        let mut mass = stated(inertial, at, reader)?;
+        let mut mass = stated(inertial, at, solids.is_empty(), reader)?;
         if mass.about_com.is_none() && xml::child(inertial, "pose").is_some() {
             mass.about_com = of_solids(solids, mass.kg);
         }
@@ -76,9 +76,27 @@ pub(super) fn warn_of_densities(link: Node, inertial: Option<Node>, reader: &mut
     }
 }
 
-fn stated(inertial: Node, link: &Isometry3<f64>, reader: &mut Reader) -> Option<Mass> {
+/// Reads a stated mass. A link without shapes may have none: `is_bare`.
+fn stated(
+    inertial: Node,
+    link: &Isometry3<f64>,
+    is_bare: bool,
+    reader: &mut Reader,
+) -> Option<Mass> {
     let at = link * pose(inertial, reader)?;
-    let kg = reader.number(xml::child(inertial, "mass")?, Bound::Positive)?;
+    let bound = if is_bare {
+        Bound::Mass
+    } else {
+        Bound::Positive
+    };
+    let kg = reader.number(xml::child(inertial, "mass")?, bound)?;
+    if kg == 0.0 {
+        return Some(Mass {
+            kg,
+            com: at.translation.vector,
+            about_com: Some(Matrix3::zeros()),
+        });
+    }
     let moments = xml::child(inertial, "inertia").and_then(|inertia| read_inertia(inertia, reader));
     let turn = at.rotation.to_rotation_matrix();
     let about_com = moments.map(|moments| turn.matrix() * moments * turn.matrix().transpose());
@@ -89,7 +107,26 @@ fn stated(inertial: Node, link: &Isometry3<f64>, reader: &mut Reader) -> Option<
     })
 }
 
+/// Warns of moments of inertia that a link does not state (W036): SDF has defaults for them.
+pub(super) fn warn_of_missing_moments(inertia: Node, reader: &mut Reader) {
+    let missing = ["ixx", "iyy", "izz"].map(|name| (name, xml::child(inertia, name)));
+    let missing: Vec<String> = missing
+        .iter()
+        .filter(|(_, written)| written.is_none())
+        .map(|(name, _)| format!("`<{name}>`"))
+        .collect();
+    if !missing.is_empty() {
+        let message = format!(
+            "`<inertia>` has no {}: 1 kg·m² is used, the default of SDF",
+            missing.join(", ")
+        );
+        let help = "state all moments of inertia, or remove `<inertia>`";
+        reader.warning("W036", inertia, message, help);
+    }
+}
+
 fn read_inertia(inertia: Node, reader: &mut Reader) -> Option<Matrix3<f64>> {
+    warn_of_missing_moments(inertia, reader);
     let mut entry = |name: &str, default| match xml::child(inertia, name) {
         Some(node) => reader.number(node, Bound::Finite),
         None => Some(default),
@@ -102,11 +139,7 @@ fn read_inertia(inertia: Node, reader: &mut Reader) -> Option<Matrix3<f64>> {
 
 /// Returns the moments of inertia if they are possible. Otherwise warns (W036) and returns `None`:
 /// they are then computed from the shapes.
-pub(crate) fn possible(
-    moments: Matrix3<f64>,
-    inertia: Node,
-    reader: &mut Reader,
-) -> Option<Matrix3<f64>> {
+fn possible(moments: Matrix3<f64>, inertia: Node, reader: &mut Reader) -> Option<Matrix3<f64>> {
     if is_possible(&moments) {
         return Some(moments);
     }

@@ -1,4 +1,4 @@
-//! Reads the joints of objects in SDF.
+//! Reads the joints of models in SDF: those of objects, and the motions of those of robots.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
@@ -8,7 +8,7 @@ use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_data::PartJoint;
 
 /// Limits beyond this are none. Units: metres or radians.
-pub(super) const UNLIMITED: f64 = 1e6;
+const UNLIMITED: f64 = 1e6;
 /// The minor version of SDF 1 from which axes are in the frame of their joint, no longer in that of
 /// the model.
 const OWN_FRAME: u32 = 5;
@@ -37,7 +37,7 @@ const AXIS: Children = Children {
     harmless: &[],
     refused: &["mimic"],
 };
-pub(super) const DYNAMICS: Children = Children {
+const DYNAMICS: Children = Children {
     read: &[
         "damping",
         "friction",
@@ -48,7 +48,7 @@ pub(super) const DYNAMICS: Children = Children {
     refused: &[],
 };
 /// There is no motor whose effort and speed could have limits.
-pub(super) const LIMIT: Children = Children {
+const LIMIT: Children = Children {
     read: &[
         "lower",
         "upper",
@@ -78,81 +78,120 @@ pub(crate) fn kind<'a>(joint: Node<'a>, reader: &mut Reader) -> Option<&'a str> 
     Some(kind)
 }
 
-/// Reads a joint of a model at a pose, whose own pose is relative to the frame `child`. Reports W033 to W035, and
-/// returns `None`, if it can't be simulated.
+/// The motion of a joint with one axis.
+pub(crate) struct Motion {
+    pub(crate) slides: bool,
+    /// Frame: that of the joint's model.
+    pub(crate) axis: Vector3<f64>,
+    /// Its lower and upper limit, as far as it has them. Units: metres or radians.
+    pub(crate) range: [Option<f64>; 2],
+    pub(crate) damping: f64,
+    pub(crate) friction: f64,
+}
+
+/// Reads a joint of an object, whose model is at a pose, and whose own pose is relative to the frame
+/// `child`. Reports W033 to W035, and returns `None`, if it can't be simulated.
 pub(crate) fn read(
     joint: Node,
     child: &Isometry3<f64>,
     model: &Isometry3<f64>,
     reader: &mut Reader,
 ) -> Option<PartJoint> {
-    let name = joint.attribute("name").unwrap_or_default();
     let kind = kind(joint, reader)?;
     let at = child * pose(joint, reader)?;
     let axis = reader.required(joint, "axis")?;
     AXIS.check(axis, reader);
+    let own = model.rotation.inverse() * at.rotation;
+    let motion = motion(joint, (kind, axis), own, reader)?;
+    let [lower, upper] = motion.range;
+    Some(PartJoint {
+        slides: motion.slides,
+        axis: (model.rotation * motion.axis).into(),
+        anchor_m: at.translation.vector.into(),
+        range: [
+            lower.unwrap_or(f64::NEG_INFINITY),
+            upper.unwrap_or(f64::INFINITY),
+        ],
+        damping: motion.damping,
+        friction: motion.friction,
+    })
+}
+
+/// Reads the motion about or along the `<axis>` of a joint of a kind. `own`: the orientation of the
+/// joint in its model. Reports W034 and W035, and returns `None`, if it can't be simulated.
+pub(crate) fn motion(
+    joint: Node,
+    (kind, axis): (&str, Node),
+    own: UnitQuaternion<f64>,
+    reader: &mut Reader,
+) -> Option<Motion> {
+    let name = joint.attribute("name").unwrap_or_default();
     let why = "a joint begins at 0";
     refuse_unless(axis, "initial_position", 0.0, why, reader);
-    let own = model.rotation.inverse() * at.rotation;
     let direction = direction(joint, axis, own, reader)?;
-    let Some(direction) = (model.rotation * direction).try_normalize(1e-9) else {
+    let Some(direction) = direction.try_normalize(1e-9) else {
         let message = format!("the axis of the joint `{name}` must not be zero");
-        reader.error(
-            "W034",
-            axis,
-            message,
-            "write, for example, `<xyz>0 0 1</xyz>`",
-        );
+        let help = "write, for example, `<xyz>0 0 1</xyz>`";
+        reader.error("W034", axis, message, help);
         return None;
     };
-    let limits = xml::child(axis, "limit").filter(|_| kind != "continuous");
+    let limits = xml::child(axis, "limit");
     if let Some(limits) = limits {
         LIMIT.check(limits, reader);
     }
-    let mut limit =
-        |name: &str, otherwise: f64| match limits.and_then(|limits| xml::child(limits, name)) {
-            Some(node) => reader.number(node, Bound::Finite).map(|value| {
-                if value.abs() > UNLIMITED {
-                    otherwise
-                } else {
-                    value
-                }
-            }),
-            None => Some(otherwise),
-        };
-    let range = [
-        limit("lower", f64::NEG_INFINITY)?,
-        limit("upper", f64::INFINITY)?,
-    ];
-    if range[0] > range[1] {
+    let range = match kind {
+        "continuous" => [None; 2],
+        _ => [
+            limit(limits, "lower", reader)?,
+            limit(limits, "upper", reader)?,
+        ],
+    };
+    if let [Some(lower), Some(upper)] = range
+        && lower > upper
+    {
         let message = format!(
-            "the joint `{name}` has a lower limit of {} above its upper limit of {}",
-            range[0], range[1]
+            "the joint `{name}` has a lower limit of {lower} above its upper limit of {upper}"
         );
         reader.error("W034", axis, message, "exchange the limits");
         return None;
     }
-    let dynamics = xml::child(axis, "dynamics");
-    let mut resistance = |name: &str| match dynamics.and_then(|dynamics| xml::child(dynamics, name))
-    {
-        Some(node) => reader.number(node, Bound::NotNegative),
-        None => Some(0.0),
-    };
-    let (damping, friction) = (resistance("damping")?, resistance("friction")?);
-    if let Some(dynamics) = dynamics {
-        DYNAMICS.check(dynamics, reader);
-        let why = "joints have no springs";
-        refuse_unless(dynamics, "spring_stiffness", 0.0, why, reader);
-    }
-    let anchor_m = at.translation.vector.into();
-    Some(PartJoint {
+    let [damping, friction] = resistance(axis, reader)?;
+    Some(Motion {
         slides: kind == "prismatic",
-        axis: direction.into(),
-        anchor_m,
+        axis: direction,
         range,
         damping,
         friction,
     })
+}
+
+/// Reads a limit: `Some(None)` if there is none, `None` after a fault.
+#[expect(clippy::option_option, reason = "a fault and a missing limit differ")]
+pub(super) fn limit(limits: Option<Node>, name: &str, reader: &mut Reader) -> Option<Option<f64>> {
+    let Some(node) = limits.and_then(|limits| xml::child(limits, name)) else {
+        return Some(None);
+    };
+    if xml::text(node).parse::<f64>().is_ok_and(f64::is_infinite) {
+        return Some(None);
+    }
+    let value = reader.number(node, Bound::Finite)?;
+    Some(Some(value).filter(|value| value.abs() <= UNLIMITED))
+}
+
+/// Reads damping and dry friction. Reports a spring (W035).
+fn resistance(axis: Node, reader: &mut Reader) -> Option<[f64; 2]> {
+    let Some(dynamics) = xml::child(axis, "dynamics") else {
+        return Some([0.0; 2]);
+    };
+    DYNAMICS.check(dynamics, reader);
+    let why = "joints have no springs";
+    refuse_unless(dynamics, "spring_stiffness", 0.0, why, reader);
+    let [damping, friction] =
+        ["damping", "friction"].map(|name| match xml::child(dynamics, name) {
+            Some(node) => reader.number(node, Bound::NotNegative),
+            None => Some(0.0),
+        });
+    Some([damping?, friction?])
 }
 
 /// Returns the direction of a joint's axis in the frame of its model. `own`: the orientation of the

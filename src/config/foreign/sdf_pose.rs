@@ -209,11 +209,24 @@ fn included<'r>(node: Node, reader: &'r Reader) -> Option<&'r Included> {
         .filter(|_| node.tag_name().name() == "include")
 }
 
+/// The name of an element, or else that of the model that it includes.
 pub(super) fn name_of(node: Node, reader: &Reader) -> Option<String> {
     node.attribute("name")
         .or_else(|| xml::child(node, "name").map(xml::text))
         .map(str::to_owned)
         .or_else(|| included(node, reader).map(|included| included.name.clone()))
+}
+
+/// Whether an element has a name; without a copy of it, because all elements may be searched for all
+/// names.
+fn has_name(node: Node, name: &str, reader: &Reader) -> bool {
+    let own = node
+        .attribute("name")
+        .or_else(|| Some(xml::text(xml::child(node, "name")?)));
+    match own {
+        Some(own) => own == name,
+        None => included(node, reader).is_some_and(|included| included.name == name),
+    }
 }
 
 fn with_frame<'a>(model: Node<'a>) -> impl Iterator<Item = Node<'a>> {
@@ -229,7 +242,7 @@ fn find<'a, 'n>(
     name: &'n str,
     reader: &Reader,
 ) -> Option<(Node<'a>, Option<&'n str>)> {
-    let is_named = |child: &Node<'a>, name: &str| name_of(*child, reader).as_deref() == Some(name);
+    let is_named = |child: &Node<'a>, name: &str| has_name(*child, name, reader);
     if let Some(child) = with_frame(model).find(|child| is_named(child, name)) {
         return Some((child, None));
     }
@@ -319,15 +332,19 @@ fn link_of(model: Node, name: &str, depth: usize, reader: &Reader) -> Option<Str
             depth + 1,
             reader,
         ),
-        ("model", rest) => {
-            let link = link_of(child, rest.unwrap_or(OWN), depth + 1, reader)?;
-            Some(format!("{}{link}", prefix(child, reader)))
-        }
-        (_, rest) => {
-            let frame = included(child, reader)?.frames.get(rest.unwrap_or(OWN))?;
-            Some(format!("{}{}", prefix(child, reader), frame.link.as_ref()?))
-        }
+        (_, rest) => link_in(child, rest.unwrap_or(OWN), depth, reader),
     }
+}
+
+/// Returns the name of the link that carries a frame of a nested or included model, as the model
+/// around it names this link.
+fn link_in(model: Node, frame: &str, depth: usize, reader: &Reader) -> Option<String> {
+    let link = match included(model, reader) {
+        Some(included) => included.frames.get(frame)?.link.clone()?,
+        None if model.tag_name().name() == "model" => link_of(model, frame, depth + 1, reader)?,
+        None => return None,
+    };
+    Some(format!("{}{link}", prefix(model, reader)))
 }
 
 /// Returns the name of a model's canonical link: the one that it names, or its first.
@@ -339,10 +356,11 @@ fn canonical_link(model: Node, depth: usize, reader: &Reader) -> Option<String> 
         return link_of(model, name, depth + 1, reader);
     }
     let own = xml::child(model, "link").and_then(|link| link.attribute("name"));
+    // Not by their names: a nested model may have that of this one, or none.
     own.map(str::to_owned).or_else(|| {
         with_frame(model)
             .filter(|child| is_model(*child))
-            .find_map(|child| link_of(model, &name_of(child, reader)?, depth + 1, reader))
+            .find_map(|child| link_in(child, OWN, depth, reader))
     })
 }
 

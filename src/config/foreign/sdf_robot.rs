@@ -1,12 +1,12 @@
 //! Reads a robot in SDF, Gazebo's format: a model with the models in it, or the models of a world
 //! that joints connect.
 
-use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use nalgebra::{Isometry3, Vector3};
 
+use crate::foreign::inclusions::Inclusions;
 use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::sdf::check_version;
@@ -46,12 +46,10 @@ pub(crate) fn read(
     let text = repaired(&source.text);
     let document = xml::parse_model(source, &text)?;
     let mut reader = Reader::new(source);
-    let opened = Cell::new(0);
     let file = SdfFile {
         lookup,
         path,
-        depth: 0,
-        opened: &opened,
+        inclusions: Inclusions::default(),
     };
     let (name, group) = robot(document.root_element(), &file, &mut reader).unwrap_or_default();
     let text = match group.texts.as_str() {
@@ -133,9 +131,10 @@ fn robot(root: Node, file: &SdfFile, reader: &mut Reader) -> Option<(String, Gro
     // The robot is in the frame of its first model: a scene places the whole.
     let base = candidates[chosen[0]].node;
     warn_of_pose(base, reader);
-    let to_robot = match world {
-        Some(_) => pose(base, reader).unwrap_or_default().inverse(),
-        None => Isometry3::identity(),
+    let is_placed = world.is_some() || base.tag_name().name() == "include";
+    let to_robot = match is_placed {
+        true => pose(base, reader).unwrap_or_default().inverse(),
+        false => Isometry3::identity(),
     };
     let mut elements = RobotElements::default();
     for idx in &chosen {
@@ -239,9 +238,8 @@ fn leave_others(candidates: &[Candidate], chosen: &[usize], robot: &str, reader:
 
 /// Warns of a height or tilt of the whole robot (W036), which scenes and profiles give it.
 fn warn_of_pose(model: Node, reader: &mut Reader) {
-    let Some(element) = xml::child(model, "pose") else {
-        return;
-    };
+    // That of an `<include>` may be in the file of its model.
+    let element = xml::child(model, "pose").unwrap_or(model);
     let (Some(at), _) = reader.aside(|reader| pose(model, reader)) else {
         return;
     };

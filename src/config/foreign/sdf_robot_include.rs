@@ -1,6 +1,5 @@
 //! Reads the models that a robot in SDF includes, each with the places of its own file.
 
-use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -8,35 +7,33 @@ use nalgebra::Isometry3;
 
 use crate::foreign::folder::{self, ModelText};
 use crate::foreign::frames::{Frame, Included, OWN};
+use crate::foreign::inclusions::Inclusions;
 use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
-use crate::foreign::nested::{DEEPEST, check_include, refuse_static, register};
+use crate::foreign::nested::{check_include, refuse_static, register};
 use crate::foreign::sdf::{is_static, root_model};
+use crate::foreign::sdf_ends::JointEnd;
 use crate::foreign::sdf_pose;
-use crate::foreign::sdf_robot_model::{Group, JointAt, JointEnd, LinkAt, RobotElements};
+use crate::foreign::sdf_robot_joint::is_coupling;
+use crate::foreign::sdf_robot_model::{Group, JointAt, LinkAt, RobotElements};
 use crate::foreign::xml::{self, Node, Reader};
 use crate::foreign::{mjcf, root_name, urdf_tree};
 use actcheck_base::{Diagnostics, Source};
 use actcheck_data::{ModelTree, TreeGeometry, TreeJoint};
 
-/// Most files that a robot may consist of.
-const MOST_FILES: usize = 200;
-
 /// A file of a robot.
 pub(crate) struct SdfFile<'a> {
     pub(crate) lookup: &'a Lookup<'a>,
     pub(crate) path: &'a Path,
-    /// Number of models that include this one.
-    pub(crate) depth: usize,
-    /// Number of files of the robot that have been opened.
-    pub(crate) opened: &'a Cell<usize>,
+    /// The models that include this one.
+    pub(crate) inclusions: Inclusions,
 }
 
 impl SdfFile<'_> {
     /// Returns a mesh's URI as a path that does not depend on this file, if that is an included one.
     pub(crate) fn mesh(&self, uri: &str) -> String {
         match self.lookup.resolve(uri, self.path) {
-            Ok(path) if self.depth > 0 => format!("file://{}", path.display()),
+            Ok(path) if self.inclusions.is_inside() => format!("file://{}", path.display()),
             _ => uri.to_owned(),
         }
     }
@@ -86,17 +83,9 @@ impl Submodels {
 
 /// Reads the model of an `<include>`. Returns `None` after it has reported a fault.
 fn include(include: Node, file: &SdfFile, reader: &mut Reader) -> Option<Group> {
-    check_include(include, reader);
+    check_include(include, is_coupling, reader);
     let uri = reader.required(include, "uri")?;
-    if file.depth >= DEEPEST || file.opened.get() >= MOST_FILES {
-        let message = format!(
-            "models are included more than {DEEPEST} levels deep, or more than {MOST_FILES} times"
-        );
-        let help = "remove the `<include>`: a model may include itself";
-        reader.error("W035", uri, message, help);
-        return None;
-    }
-    file.opened.set(file.opened.get() + 1);
+    file.inclusions.check_room(uri, reader)?;
     let merged = reader.boolean_attribute(include, "merge")?;
     let text = match folder::text_of(xml::text(uri), file.path, file.lookup) {
         Ok(Some(text)) => text,
@@ -112,7 +101,10 @@ fn include(include: Node, file: &SdfFile, reader: &mut Reader) -> Option<Group> 
             return None;
         }
     };
-    let mut model = submodel(&text, file, reader)?;
+    let inclusions = file
+        .inclusions
+        .enter(file.path, &text.path, &text.source, uri, reader)?;
+    let mut model = submodel(&text, file.lookup, inclusions, reader)?;
     let is_static = match xml::child(include, "static") {
         Some(written) => reader.boolean(written)?,
         None => model.is_static && !merged,
@@ -127,28 +119,32 @@ fn include(include: Node, file: &SdfFile, reader: &mut Reader) -> Option<Group> 
 }
 
 /// Reads a model of another file.
-fn submodel(text: &ModelText, file: &SdfFile, reader: &mut Reader) -> Option<Submodel> {
+fn submodel(
+    text: &ModelText,
+    outer: &Lookup,
+    inclusions: Inclusions,
+    reader: &mut Reader,
+) -> Option<Submodel> {
     let mut folders: Vec<_> = text
         .path
         .parent()
         .map(Path::to_path_buf)
         .into_iter()
         .collect();
-    folders.extend(file.lookup.folders.iter().cloned());
+    folders.extend(outer.folders.iter().cloned());
     let lookup = Lookup {
-        files: file.lookup.files,
+        files: outer.files,
         folders,
     };
     let inner = SdfFile {
         lookup: &lookup,
         path: &text.path,
-        depth: file.depth + 1,
-        opened: file.opened,
+        inclusions,
     };
     let read = match root_name(&text.source.text) {
         Some("mujoco") => mjcf::robot(&text.source, &text.path, &lookup).map(|(tree, _, said)| {
             reader.found.extend(said);
-            of_tree(tree, &inner)
+            of_tree(tree, BTreeMap::new(), &inner)
         }),
         Some("robot") => urdf(&text.source, &inner, &mut reader.found),
         _ => sdf(&text.source, &inner, &mut reader.found),
@@ -201,11 +197,15 @@ fn urdf(
     let mut reader = Reader::new(source);
     let read = urdf_tree::read(document.root_element(), &mut reader);
     found.extend(reader.found);
-    Ok(of_tree(read.tree, file))
+    Ok(of_tree(read.tree, read.faults_of_visuals, file))
 }
 
 /// Returns the links and joints of a model in another format, with all joints at 0.
-fn of_tree(tree: ModelTree, file: &SdfFile) -> Option<Submodel> {
+fn of_tree(
+    tree: ModelTree,
+    mut faults_of_visuals: BTreeMap<String, Diagnostics>,
+    file: &SdfFile,
+) -> Option<Submodel> {
     let mut poses: BTreeMap<String, Isometry3<f64>> = BTreeMap::new();
     let is_child = |name: &str| tree.joints.iter().any(|joint| joint.child == name);
     let root = tree
@@ -274,11 +274,12 @@ fn of_tree(tree: ModelTree, file: &SdfFile) -> Option<Submodel> {
         }
         group.links.push(LinkAt {
             at: poses.get(&link.name).copied().unwrap_or_default(),
+            faults_of_visuals: faults_of_visuals.remove(&link.name),
             link,
             model: String::new(),
             collides: None,
-            faults_of_visuals: None,
-            has_no_mass: false,
+            lacks_mass: false,
+            lacks_moments: false,
         });
     }
     Some(Submodel {

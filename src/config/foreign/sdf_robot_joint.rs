@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::UnitQuaternion;
 
-use crate::foreign::elements::{Children, refuse_unless};
-use crate::foreign::sdf_joint::{self, DYNAMICS, LIMIT, UNLIMITED};
+use crate::foreign::elements::Children;
+use crate::foreign::sdf_joint;
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_data::{TreeJoint, TreeMimic, TreeMotion};
 
@@ -59,79 +59,51 @@ pub(crate) fn read(
     JOINT.check(joint, reader);
     reader.attribute(joint, "type")?;
     let axis = xml::child(joint, "axis");
-    let is_coupled = axis.is_some_and(|axis| xml::child(axis, "mimic").is_some());
-    if sdf_joint::is_rigid(joint) && !is_coupled {
+    let mimic_node = axis.and_then(|axis| xml::child(axis, "mimic"));
+    if joint.attribute("type") == Some("fixed") {
+        if let Some(mimic) = mimic_node {
+            let message = format!("the joint `{}` is fixed: it follows no other", fixed.name);
+            let help = "remove the `<mimic>`, or make the joint `revolute` or `prismatic`";
+            reader.warning("W036", mimic, message, help);
+        }
+        return Some(fixed);
+    }
+    if sdf_joint::is_rigid(joint) && mimic_node.is_none() {
         return Some(fixed);
     }
     let kind = sdf_joint::kind(joint, reader)?;
     let axis = reader.required(joint, "axis")?;
     AXIS.check(axis, reader);
-    let why = "a joint begins at 0";
-    refuse_unless(axis, "initial_position", 0.0, why, reader);
-    let direction = sdf_joint::direction(joint, axis, own, reader)?;
-    let Some(direction) = direction.try_normalize(1e-9) else {
-        let message = format!("the axis of the joint `{}` must not be zero", fixed.name);
-        let help = "write, for example, `<xyz>0 0 1</xyz>`";
-        reader.error("W034", axis, message, help);
-        return None;
-    };
+    let read = sdf_joint::motion(joint, (kind, axis), own, reader)?;
     let limits = xml::child(axis, "limit");
-    if let Some(limits) = limits {
-        LIMIT.check(limits, reader);
-    }
-    let [lower, upper] = ["lower", "upper"].map(|name| limit(limits, name, reader));
-    let [effort, velocity] = ["effort", "velocity"].map(|name| limit(limits, name, reader));
+    let [effort, velocity] =
+        ["effort", "velocity"].map(|name| sdf_joint::limit(limits, name, reader));
     // Negative values mean that there is none; 0 means here that it is unknown.
     let [effort, velocity] =
         [effort?, velocity?].map(|most| most.map_or(0.0, |most| most.max(0.0)));
-    let range = [lower?, upper?];
-    let (motion, [lower, upper]) = match (kind, range) {
-        ("prismatic", range) => (
+    let (motion, [lower, upper]) = match (read.slides, read.range) {
+        (true, range) => (
             TreeMotion::Prismatic,
             bounded(joint, range, SLIDES_M, reader),
         ),
-        ("continuous", _) | (_, [None, None]) => {
-            (TreeMotion::Continuous, [f64::NEG_INFINITY, f64::INFINITY])
-        }
-        (_, range) => (
+        (false, [None, None]) => (TreeMotion::Continuous, [f64::NEG_INFINITY, f64::INFINITY]),
+        (false, range) => (
             TreeMotion::Revolute,
             bounded(joint, range, TURNS_RAD, reader),
         ),
     };
-    if lower > upper {
-        let name = &fixed.name;
-        let message = format!(
-            "the joint `{name}` has a lower limit of {lower} above its upper limit of {upper}"
-        );
-        reader.error("W034", axis, message, "exchange the limits");
-        return None;
-    }
-    let [damping, friction] = resistance(axis, reader)?;
     Some(TreeJoint {
         motion,
-        axis: direction,
+        axis: read.axis,
         lower,
         upper,
         effort,
         velocity,
-        damping,
-        friction,
+        damping: read.damping,
+        friction: read.friction,
         mimic: mimic(axis, reader)?,
         ..fixed
     })
-}
-
-/// Reads a limit: `Some(None)` if there is none, `None` after a fault.
-#[expect(clippy::option_option, reason = "a fault and a missing limit differ")]
-fn limit(limits: Option<Node>, name: &str, reader: &mut Reader) -> Option<Option<f64>> {
-    let Some(node) = limits.and_then(|limits| xml::child(limits, name)) else {
-        return Some(None);
-    };
-    if xml::text(node).parse::<f64>().is_ok_and(f64::is_infinite) {
-        return Some(None);
-    }
-    let value = reader.number(node, Bound::Finite)?;
-    Some(Some(value).filter(|value| value.abs() <= UNLIMITED))
 }
 
 /// Returns limits with both ends. Warns of a missing one (W036).
@@ -149,22 +121,6 @@ fn bounded(joint: Node, range: [Option<f64>; 2], most: f64, reader: &mut Reader)
     );
     reader.warning("W036", joint, message, "write both limits");
     found
-}
-
-/// Reads damping and dry friction. Reports a spring (W035).
-fn resistance(axis: Node, reader: &mut Reader) -> Option<[f64; 2]> {
-    let Some(dynamics) = xml::child(axis, "dynamics") else {
-        return Some([0.0; 2]);
-    };
-    DYNAMICS.check(dynamics, reader);
-    let why = "joints have no springs";
-    refuse_unless(dynamics, "spring_stiffness", 0.0, why, reader);
-    let [damping, friction] =
-        ["damping", "friction"].map(|name| match xml::child(dynamics, name) {
-            Some(node) => reader.number(node, Bound::NotNegative),
-            None => Some(0.0),
-        });
-    Some([damping?, friction?])
 }
 
 /// Reads the joint that a joint follows, in SDF 1.11 and later: `Some(None)` if it follows none,

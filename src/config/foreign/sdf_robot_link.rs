@@ -16,7 +16,7 @@ use crate::foreign::sdf_surface::Surface;
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_data::{Mesh, Shape, TreeGeometry, TreeInertial, TreeLink, TreeSolid};
 
-/// Mass of a link without one, in SDF; its moments are those of 1 kg·m². Unit: kilograms.
+/// Mass of a link without one, in SDF; its moments are 1 kg·m². Unit: kilograms.
 const USUAL_KG: f64 = 1.0;
 const MESH: Children = Children {
     read: &["uri", "scale"],
@@ -65,6 +65,7 @@ pub(crate) fn read(
     });
     let collides = xml::child(link, "self_collide").and_then(|node| reader.boolean(node));
     let inertial = inertial(link, &solids, file, reader);
+    let (lacks_mass, lacks_moments) = unstated(link);
     LinkAt {
         at: Isometry3::identity(),
         link: TreeLink {
@@ -77,7 +78,8 @@ pub(crate) fn read(
         model: String::new(),
         collides,
         faults_of_visuals: Some(faults).filter(|faults| !faults.is_empty()),
-        has_no_mass: xml::child(link, "inertial").is_none(),
+        lacks_mass,
+        lacks_moments,
     }
 }
 
@@ -177,7 +179,7 @@ fn shape(kind: Node, file: &SdfFile, reader: &mut Reader) -> Option<TreeGeometry
             })
         }
         other => {
-            let message = format!("the shape {other} can't be part of a robot");
+            let message = format!("the geometry `<{other}>` can't be part of a robot");
             reader.error("W035", kind, message, KINDS);
             None
         }
@@ -211,6 +213,27 @@ fn inertial(
             moments_place: None,
         }),
     }
+}
+
+/// Whether a link states no mass, and whether not all of its moments.
+fn unstated(link: Node) -> (bool, bool) {
+    let Some(inertial) = xml::child(link, "inertial") else {
+        return (true, true);
+    };
+    if inertial
+        .attribute("auto")
+        .map(str::trim)
+        .and_then(xml::truth)
+        == Some(true)
+    {
+        return (false, false);
+    }
+    let mass = xml::child(inertial, "mass");
+    let is_massless = mass.is_some_and(|mass| xml::text(mass).parse() == Ok(0.0));
+    let inertia = xml::child(inertial, "inertia");
+    let has = |name| inertia.is_some_and(|inertia| xml::child(inertia, name).is_some());
+    let has_moments = ["ixx", "iyy", "izz"].into_iter().all(has);
+    (mass.is_none(), !has_moments && !is_massless)
 }
 
 fn stated(inertial: Node, reader: &mut Reader) -> Option<TreeInertial> {

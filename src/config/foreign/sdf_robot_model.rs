@@ -5,13 +5,15 @@ use std::collections::BTreeMap;
 use nalgebra::Isometry3;
 
 use crate::foreign::elements::Children;
-use crate::foreign::nested::refuse_static;
+use crate::foreign::inclusions::check_size;
+use crate::foreign::nested::{refuse_static, warn_of_plugin};
 use crate::foreign::sdf::is_static;
+use crate::foreign::sdf_ends::{JointEnd, WrittenPart};
 use crate::foreign::sdf_pose::{self, pose};
 use crate::foreign::sdf_robot_include::{SdfFile, Submodels};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use crate::foreign::{sdf_robot_joint, sdf_robot_link};
-use actcheck_base::{Diagnostics, did_you_mean};
+use actcheck_base::{Diagnostic, Diagnostics, did_you_mean};
 use actcheck_data::{Mesh, TreeJoint, TreeLink, TreeMimic, TreeMotion};
 
 /// Of the elements that are read, `allow_auto_disable`, `name` and `origin` have no effect.
@@ -37,6 +39,9 @@ const MODEL: Children = Children {
     refused: &[],
 };
 
+/// Longest name of a link with those of the models around it: all pairs of links may be listed.
+const LONGEST_NAME: usize = 500;
+
 /// A link. The poses in it are in its own frame.
 pub(crate) struct LinkAt {
     pub(crate) link: TreeLink,
@@ -48,16 +53,10 @@ pub(crate) struct LinkAt {
     pub(crate) collides: Option<bool>,
     /// Faults of shapes that are only seen.
     pub(crate) faults_of_visuals: Option<Diagnostics>,
-    /// Whether it has no `<inertial>`.
-    pub(crate) has_no_mass: bool,
-}
-
-/// An end of a joint.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum JointEnd {
-    /// A link, by its index.
-    Link(usize),
-    World,
+    /// Whether its file states no mass.
+    pub(crate) lacks_mass: bool,
+    /// Whether its file does not state all moments of inertia.
+    pub(crate) lacks_moments: bool,
 }
 
 /// A joint. The names of its ends and its origin are those of its own file, or empty.
@@ -142,10 +141,28 @@ impl Group {
         }
     }
 
-    /// Adds the pairs of links of one model of which at least one collides with no other.
-    fn add_passing(&mut self) {
-        for (idx, first) in self.links.iter().enumerate() {
-            for second in &self.links[idx + 1..] {
+    /// Adds the pairs of colliding links of one model of which at least one collides with no other.
+    /// Reports names that are too long (W055).
+    fn add_passing(&mut self, reader: &mut Reader) {
+        let longest = self.links.iter().max_by_key(|link| link.link.name.len());
+        if let Some(link) = longest.filter(|link| link.link.name.len() > LONGEST_NAME) {
+            let message = format!(
+                "with its models, the name of this link is longer than {LONGEST_NAME} bytes"
+            );
+            let place = &link.link.place;
+            let error = Diagnostic::error("W055", message).at(&place.source, xml::tag(place));
+            reader
+                .found
+                .push(error.help("give links and models shorter names"));
+            return;
+        }
+        let solid = || {
+            self.links
+                .iter()
+                .filter(|link| !link.link.solids.is_empty())
+        };
+        for (idx, first) in solid().enumerate() {
+            for second in solid().skip(idx + 1) {
                 let is_pair = first.model == second.model
                     && [first.collides, second.collides].contains(&Some(false));
                 if is_pair {
@@ -160,13 +177,9 @@ impl Group {
     }
 }
 
-/// An element of a model, before it is read.
-struct WrittenPart<'a> {
-    node: Node<'a>,
-    /// Pose of its model in the outermost one.
-    model: Isometry3<f64>,
-    /// The beginning of the names in its model.
-    prefix: String,
+/// A link of a model, before it is read.
+struct WrittenLink<'a> {
+    part: WrittenPart<'a>,
     /// Whether links of its model collide with each other.
     collides: Option<bool>,
 }
@@ -174,7 +187,7 @@ struct WrittenPart<'a> {
 /// The elements of a model and of the models nested in it, and the models that they include.
 #[derive(Default)]
 pub(crate) struct RobotElements<'a> {
-    links: Vec<WrittenPart<'a>>,
+    links: Vec<WrittenLink<'a>>,
     joints: Vec<WrittenPart<'a>>,
     includes: Vec<WrittenPart<'a>>,
     /// Plugins by which a joint follows another.
@@ -197,7 +210,6 @@ impl<'a> RobotElements<'a> {
                 node,
                 model: *at,
                 prefix: String::new(),
-                collides: None,
             });
             return;
         }
@@ -233,10 +245,12 @@ impl<'a> RobotElements<'a> {
                 node,
                 model: *at,
                 prefix: prefix.to_owned(),
-                collides,
             };
             match child.tag_name().name() {
-                "link" => self.links.push(written(child)),
+                "link" => self.links.push(WrittenLink {
+                    part: written(child),
+                    collides,
+                }),
                 "joint" => self.joints.push(written(child)),
                 "include" => self.includes.push(written(child)),
                 "model" => {
@@ -251,11 +265,7 @@ impl<'a> RobotElements<'a> {
                 "plugin" if sdf_robot_joint::is_coupling(child) => {
                     self.couplings.push(written(child));
                 }
-                "plugin" => {
-                    let message = "the plugin is not run".to_owned();
-                    let help = "forces and motions by plugins are not simulated";
-                    reader.warning("W036", child, message, help);
-                }
+                "plugin" => warn_of_plugin(child, reader),
                 _ => {}
             }
         }
@@ -267,7 +277,6 @@ impl<'a> RobotElements<'a> {
             node: *node,
             model: *to_robot,
             prefix: String::new(),
-            collides: None,
         }));
     }
 
@@ -281,16 +290,26 @@ impl<'a> RobotElements<'a> {
             let Some(model) = self.models.take(include.node) else {
                 continue;
             };
-            if let Some(own) = pose(include.node, reader) {
+            let n_links = group.links.len() + model.links.len();
+            if let Some(own) = pose(include.node, reader)
+                && check_size(n_links, include.node, reader).is_some()
+            {
                 let prefix = format!(
                     "{}{}",
                     include.prefix,
                     sdf_pose::prefix(include.node, reader)
                 );
                 group.add(model, &(include.model * own), &prefix);
+                let plugins = xml::children(include.node, "plugin");
+                let couplings = plugins.filter(|plugin| sdf_robot_joint::is_coupling(*plugin));
+                self.couplings.extend(couplings.map(|node| WrittenPart {
+                    node,
+                    model: include.model,
+                    prefix: prefix.clone(),
+                }));
             }
         }
-        group.add_passing();
+        group.add_passing(reader);
         for joint in &self.joints {
             if let Some(read) = read_joint(joint, &group, reader) {
                 group.joints.push(read);
@@ -303,7 +322,15 @@ impl<'a> RobotElements<'a> {
     }
 }
 
-fn read_link(link: &WrittenPart, group: &mut Group, file: &SdfFile, reader: &mut Reader) {
+fn read_link(
+    WrittenLink {
+        part: link,
+        collides,
+    }: &WrittenLink,
+    group: &mut Group,
+    file: &SdfFile,
+    reader: &mut Reader,
+) {
     let at = link.model * pose(link.node, reader).unwrap_or_default();
     let Some(name) = reader.attribute(link.node, "name") else {
         return;
@@ -317,7 +344,7 @@ fn read_link(link: &WrittenPart, group: &mut Group, file: &SdfFile, reader: &mut
     let mut read = sdf_robot_link::read(link.node, &name, file, &mut group.meshes, reader);
     read.at = at;
     read.model.clone_from(&link.prefix);
-    read.collides = read.collides.or(link.collides);
+    read.collides = read.collides.or(*collides);
     group.links.push(read);
 }
 
@@ -332,10 +359,11 @@ fn read_joint(joint: &WrittenPart, group: &Group, reader: &mut Reader) -> Option
         reader.error("W051", node, message, "give one of them another name");
         return None;
     }
-    let ends = ["parent", "child"].map(|which| end(joint, which, group, reader));
-    let [parent, child] = ends;
+    let links = group.links.iter().map(|link| link.link.name.as_str());
+    let links: Vec<&str> = links.collect();
+    let [parent, child] = ["parent", "child"].map(|which| joint.end(which, &links, reader));
     let (parent, child) = (parent?, child?);
-    let usual = frame_of_child(joint, child, group, reader)?;
+    let usual = joint.frame_of_child(child, |idx| group.links[idx].at, reader)?;
     let frame = usual * pose(node, reader)?;
     let own = joint.model.rotation.inverse() * frame.rotation;
     let fixed = TreeJoint::fixed(name, ["", ""], Isometry3::identity(), reader.place(node));
@@ -352,53 +380,6 @@ fn read_joint(joint: &WrittenPart, group: &Group, reader: &mut Reader) -> Option
         ends: [parent, child],
         frame,
     })
-}
-
-/// Returns the frame in which the pose of a joint is: that of its child, in the outermost model.
-fn frame_of_child(
-    joint: &WrittenPart,
-    child: JointEnd,
-    group: &Group,
-    reader: &mut Reader,
-) -> Option<Isometry3<f64>> {
-    let JointEnd::Link(link) = child else {
-        return Some(joint.model);
-    };
-    let named = xml::text(xml::child(joint.node, "child")?);
-    match sdf_pose::carrier(joint.node, named, reader) {
-        Some(carrier) if carrier != named => {
-            Some(joint.model * sdf_pose::frame(joint.node, named, reader)?)
-        }
-        _ => Some(group.links[link].at),
-    }
-}
-
-/// Returns the link that an end of a joint names, itself or by a frame. Reports W051, and returns
-/// `None`, if there is no such link.
-fn end(joint: &WrittenPart, which: &str, group: &Group, reader: &mut Reader) -> Option<JointEnd> {
-    let element = reader.required(joint.node, which)?;
-    let named = xml::text(element);
-    let links = || group.links.iter().map(|link| link.link.name.as_str());
-    let position = |name: &str| links().position(|link| link == name);
-    let carried = sdf_pose::carrier(joint.node, named, reader)
-        .and_then(|link| position(&format!("{}{link}", joint.prefix)));
-    if let Some(idx) = carried {
-        return Some(JointEnd::Link(idx));
-    }
-    if named == "world" {
-        return Some(JointEnd::World);
-    }
-    // Early versions name links without, or with other, names of models.
-    let last = |name: &str| name.rsplit("::").next().unwrap_or(name).to_owned();
-    let mut alike = links()
-        .enumerate()
-        .filter(|(_, link)| last(link) == last(named));
-    if let (Some((idx, _)), None) = (alike.next(), alike.next()) {
-        return Some(JointEnd::Link(idx));
-    }
-    let help = did_you_mean(named, links());
-    reader.error("W051", element, format!("there is no link `{named}`"), help);
-    None
 }
 
 /// Gives a joint the coupling of a plugin.

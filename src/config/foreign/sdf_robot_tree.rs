@@ -1,10 +1,11 @@
 //! Forms the tree of a robot from links at poses and joints between them.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use nalgebra::Isometry3;
 
-use crate::foreign::sdf_robot_model::{Group, JointAt, JointEnd, LinkAt};
+use crate::foreign::sdf_ends::JointEnd;
+use crate::foreign::sdf_robot_model::{Group, JointAt, LinkAt};
 use crate::foreign::xml::{self, Reader};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_data::{ModelTree, TreeJoint, TreeLink, TreeMotion};
@@ -31,6 +32,7 @@ pub(crate) fn assemble(name: String, mut group: Group, reader: &mut Reader) -> A
         }
         return Assembled::default();
     }
+    leave_out_spare_links(&mut group, reader);
     warn_of_missing_masses(&group.links, reader);
     let root = add_root(&mut group, reader);
     let (above, closing) = spread(&group, root);
@@ -85,19 +87,66 @@ pub(crate) fn assemble(name: String, mut group: Group, reader: &mut Reader) -> A
     }
 }
 
-/// Warns of links without `<inertial>` (W036).
-fn warn_of_missing_masses(links: &[LinkAt], reader: &mut Reader) {
-    let without = || links.iter().filter(|link| link.has_no_mass);
-    let names: Vec<&str> = without().map(|link| link.link.name.as_str()).collect();
-    if let Some(first) = without().next() {
+/// Leaves out links that no joint holds and that have no shape and no mass, such as those of sensors,
+/// with a warning (W036). A robot without other links keeps them.
+fn leave_out_spare_links(group: &mut Group, reader: &mut Reader) {
+    let joined: BTreeSet<usize> = group
+        .joints
+        .iter()
+        .flat_map(|joint| joint.ends)
+        .filter_map(JointEnd::link)
+        .collect();
+    let is_spare = |idx: usize, link: &LinkAt| {
+        let has_mass = link.link.inertial.as_ref().is_some_and(|own| own.kg > 0.0);
+        !joined.contains(&idx) && link.link.solids.is_empty() && (link.lacks_mass || !has_mass)
+    };
+    let spare: Vec<bool> = group
+        .links
+        .iter()
+        .enumerate()
+        .map(|(idx, link)| is_spare(idx, link))
+        .collect();
+    // Faulty joints make connected links look disconnected.
+    if reader.found.has_errors() || spare.iter().all(|spare| *spare) {
+        return;
+    }
+    let kept = |idx: usize| spare[..idx].iter().filter(|spare| !**spare).count();
+    for end in group.joints.iter_mut().flat_map(|joint| &mut joint.ends) {
+        if let JointEnd::Link(idx) = end {
+            *idx = kept(*idx);
+        }
+    }
+    let (left, links) = std::mem::take(&mut group.links)
+        .into_iter()
+        .zip(spare)
+        .partition::<Vec<_>, _>(|(_, spare)| *spare);
+    group.links = links.into_iter().map(|(link, _)| link).collect();
+    for (link, _) in left {
         let message = format!(
-            "`{}` has no `<inertial>`: 1 kg with moments of 1 kg·m² is used, as in Gazebo",
-            names.join("`, `")
+            "`{}` is left out: no joint connects it to the robot",
+            link.link.name
         );
-        let place = &first.link.place;
+        let help = "it has no shape and no mass; a joint of the type `fixed` would hold it";
+        let place = &link.link.place;
+        let warning = Diagnostic::warning("W036", message).at(&place.source, xml::tag(place));
+        reader.found.push(warning.help(help));
+    }
+}
+
+/// Warns of each link that does not state its mass or its moments (W036): SDF has defaults for them.
+fn warn_of_missing_masses(links: &[LinkAt], reader: &mut Reader) {
+    for link in links {
+        let missing = match (link.lacks_mass, link.lacks_moments) {
+            (true, true) => "no mass and no moments of inertia: 1 kg and 1 kg·m² are used",
+            (true, false) => "no mass: 1 kg is used",
+            (false, true) => "no moments of inertia: 1 kg·m² is used",
+            (false, false) => continue,
+        };
+        let message = format!("`{}` states {missing}, the default of SDF", link.link.name);
+        let place = &link.link.place;
         let warning = Diagnostic::warning("W036", message)
             .at(&place.source, xml::tag(place))
-            .help("state the mass of each link");
+            .help("state `<mass>` and `<inertia>` of each link");
         reader.found.push(warning);
     }
 }
@@ -114,10 +163,7 @@ fn add_root(group: &mut Group, reader: &mut Reader) -> usize {
     let root = match to_world.as_slice() {
         [] => Some(widest(group)),
         [only] if only.joint.motion == TreeMotion::Fixed => {
-            only.ends.iter().find_map(|end| match end {
-                JointEnd::Link(idx) => Some(*idx),
-                JointEnd::World => None,
-            })
+            only.ends.iter().find_map(|end| end.link())
         }
         _ => None,
     };
@@ -166,7 +212,8 @@ fn add_root(group: &mut Group, reader: &mut Reader) -> usize {
         model: String::new(),
         collides: None,
         faults_of_visuals: None,
-        has_no_mass: false,
+        lacks_mass: false,
+        lacks_moments: false,
     });
     added
 }

@@ -1,14 +1,15 @@
 //! Reads the `<surface>` of a collision in SDF: friction and restitution.
 
 use crate::foreign::body::{Body, FRICTION, Role};
-use crate::foreign::elements::{Children, refuse_switch, refuse_unless};
+use crate::foreign::elements::{Children, refuse_switch, refuse_unless, warn_unless};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::Span;
 
 const SURFACE: Children = Children {
     read: &["friction", "bounce", "contact"],
-    harmless: &[],
-    refused: &["soft_contact"],
+    // Links are rigid.
+    harmless: &["soft_contact"],
+    refused: &[],
 };
 const COEFFICIENTS: Children = Children {
     read: &["ode", "bullet", "torsional"],
@@ -54,6 +55,7 @@ const CONTACT: Children = Children {
 };
 /// Bodies have this category unless they state another.
 const USUAL_CATEGORY: u32 = 0xffff;
+const NO_SLIP: &str = "contacts do not slip under a force";
 /// Slower impacts do not bounce anyway. Unit: m/s.
 const SLOW: f64 = 0.05;
 /// No impact of a scene is faster. Unit: m/s.
@@ -182,14 +184,13 @@ pub(crate) fn drake_friction(collision: Node, reader: &mut Reader) -> Option<f64
 fn coefficient(friction: Node, role: Role, reader: &mut Reader) -> Option<f64> {
     COEFFICIENTS.check(friction, reader);
     if let Some(torsional) = xml::child(friction, "torsional") {
-        check_torsional(torsional, reader);
+        check_torsional(torsional, role, reader);
     }
     let mut found = None;
     if let Some(ode) = xml::child(friction, "ode") {
         ODE.check(ode, reader);
-        let why = "contacts do not slip under a force";
-        refuse_unless(ode, "slip1", 0.0, why, reader);
-        refuse_unless(ode, "slip2", 0.0, why, reader);
+        warn_unless(ode, "slip1", 0.0, NO_SLIP, reader);
+        warn_unless(ode, "slip2", 0.0, NO_SLIP, reader);
         found = isotropic(ode, ["mu", "mu2"], role, reader);
     }
     if let Some(bullet) = xml::child(friction, "bullet") {
@@ -230,18 +231,12 @@ pub(crate) fn isotropic(
     along.or(across)
 }
 
-/// Reports friction against turning on the spot (W035), unless it is zero: the simulation has none
-/// at a point.
-fn check_torsional(torsional: Node, reader: &mut Reader) {
+/// Reports friction against turning on the spot, unless it is zero: the simulation has none at a
+/// point. It is an error of an object (W035), and ignored with a warning elsewhere (W036).
+fn check_torsional(torsional: Node, role: Role, reader: &mut Reader) {
     TORSIONAL.check(torsional, reader);
     if let Some(ode) = xml::child(torsional, "ode") {
-        refuse_unless(
-            ode,
-            "slip",
-            0.0,
-            "contacts do not slip under a force",
-            reader,
-        );
+        warn_unless(ode, "slip", 0.0, NO_SLIP, reader);
     }
     let by_patch = match xml::child(torsional, "use_patch_radius") {
         Some(node) => reader.boolean(node),
@@ -264,7 +259,10 @@ fn check_torsional(torsional: Node, reader: &mut Reader) {
     if coefficient * radius > 0.0 {
         let message = format!("torsional friction of {coefficient} can't be simulated");
         let help = "write `<coefficient>0</coefficient>`, or remove `<torsional>`";
-        reader.error("W035", torsional, message, help);
+        match role {
+            Role::Object => reader.error("W035", torsional, message, help),
+            Role::Furniture => reader.warning("W036", torsional, message, help),
+        }
     }
 }
 

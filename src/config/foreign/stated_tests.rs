@@ -246,13 +246,11 @@ fn materials_of_sdf_are_read_or_refused() {
     assert_eq!(drake.map(|(model, _)| model.friction), Ok(0.7));
     for (surface, expected) in [
         (friction("<ode><mu>0.3</mu><mu2>0.5</mu2></ode>"), "depend on the direction"),
-        (friction("<ode><slip1>0.1</slip1></ode>"), "`<slip1>` of 0.1"),
         (friction("<bullet><rolling_friction>0.1</rolling_friction></bullet>"), "`<rolling_friction>` of 0.1"),
         (
             friction("<torsional><coefficient>0.5</coefficient><patch_radius>0.01</patch_radius></torsional>"),
             "torsional friction of 0.5",
         ),
-        ("<soft_contact/>".to_owned(), "`<soft_contact>`"),
         ("<contact><collide_without_contact>TRUE</collide_without_contact></contact>".to_owned(), "without contact forces"),
         ("<contact><collide_bitmask>0</collide_bitmask></contact>".to_owned(), "touches nothing"),
         (
@@ -518,7 +516,7 @@ fn models_in_models_are_where_their_files_put_them() {
         ),
         (
             format!("{base}{}{}", include("", ""), fixed("handle::bra")),
-            "there is no `handle::bra`",
+            "there is no link `handle::bra`",
         ),
         (
             format!(

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::foreign::words::words_at;
 use crate::foreign::xml;
 use actcheck_base::{Diagnostic, Diagnostics, SourceSpan, did_you_mean};
 use actcheck_data::{ModelTree, TreeJoint, TreeMimic, TreeMotion};
@@ -63,8 +64,9 @@ fn check_mass(joint: &TreeJoint, tree: &ModelTree, found: &mut Diagnostics) {
             "W034",
             format!("the link `{}` moves but has a mass of 0", joint.child),
         );
-        let help = "set its mass in kilograms, or remove its `<collision>`";
-        fault(found, error, &inertial.place, help);
+        let solid = words_at(&inertial.place).solid;
+        let help = format!("set its mass in kilograms, or remove each {solid}");
+        fault(found, error, &inertial.place, &help);
     }
 }
 
@@ -98,11 +100,15 @@ fn check_mimic(
         "`{}` has the limits {} to {}, but `{leader}` moves it from {low:.3} to {high:.3}",
         joint.name, joint.lower, joint.upper
     );
-    let help = "its limits are taken as those of its coupling: check `<limit>` and the multiplier";
+    let words = words_at(&mimic.place);
+    let help = format!(
+        "its limits are taken as those of its coupling: check {} and the {}",
+        words.limits, words.factor
+    );
     fault(
         found,
         Diagnostic::warning("W036", message),
         &mimic.place,
-        help,
+        &help,
     );
 }

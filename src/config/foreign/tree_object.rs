@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Matrix3};
 
 use crate::foreign::assembly::{Assembly, Join};
 use crate::foreign::body::{Body, Mass, SdfModel, is_possible};
+use crate::foreign::frames::{Frame, OWN};
 use crate::foreign::geometry::{Shapes, report_volume};
 use crate::foreign::xml;
 use actcheck_base::{Diagnostic, Diagnostics, SourceSpan};
@@ -23,13 +24,18 @@ const FRICTION: f64 = 1.0;
 /// there are errors. A body without shapes is one that is only seen.
 pub(crate) fn read(tree: &ModelTree, shapes: &mut Shapes) -> (Option<SdfModel>, Diagnostics) {
     let mut found = Diagnostics::new();
-    let body = body(tree, shapes, &mut found);
+    let material = |members: &[usize], body: &mut Body, found: &mut Diagnostics| {
+        let solids = members.iter().flat_map(|link| &tree.links[*link].solids);
+        body.friction = friction(&solids.collect::<Vec<_>>(), found);
+    };
+    let (body, frames) = body(tree, shapes, false, material, &mut found);
     if found.has_errors() {
         return (None, found);
     }
     let digest = shapes.digest.clone().finish();
     let model = SdfModel {
         body,
+        frames,
         pose: Isometry3::identity(),
         is_static: false,
         digest,
@@ -37,17 +43,32 @@ pub(crate) fn read(tree: &ModelTree, shapes: &mut Shapes) -> (Option<SdfModel>, 
     (Some(model), found)
 }
 
-fn body(tree: &ModelTree, shapes: &mut Shapes, found: &mut Diagnostics) -> Body {
+/// Makes the body of a tree, with those that joints move, and reports its faults. `is_static`: it
+/// never moves. `material` gives a body its material; its links are named by their indices. Also
+/// returns the frames of the links, each with the body that carries it.
+pub(crate) fn body(
+    tree: &ModelTree,
+    shapes: &mut Shapes,
+    is_static: bool,
+    mut material: impl FnMut(&[usize], &mut Body, &mut Diagnostics),
+    found: &mut Diagnostics,
+) -> (Body, BTreeMap<String, Frame>) {
     let index: BTreeMap<&str, usize> = tree
         .links
         .iter()
         .enumerate()
         .map(|(idx, link)| (link.name.as_str(), idx))
         .collect();
+    let above: BTreeMap<&str, &TreeJoint> = tree
+        .joints
+        .iter()
+        .rev()
+        .map(|joint| (joint.child.as_str(), joint))
+        .collect();
     let places: Vec<Option<Isometry3<f64>>> = tree
         .links
         .iter()
-        .map(|link| place(link, tree, found))
+        .map(|link| place(link, &above, found))
         .collect();
     let mut joins = Vec::new();
     for joint in &tree.joints {
@@ -71,7 +92,7 @@ fn body(tree: &ModelTree, shapes: &mut Shapes, found: &mut Diagnostics) -> Body 
         });
     }
     let assembly = Assembly::of(tree.links.len(), &joins, found);
-    let mut bodies = assembly.empty_bodies(false);
+    let mut bodies = assembly.empty_bodies(is_static);
     let mut meshes = BTreeMap::new();
     for (idx, (link, at)) in tree.links.iter().zip(&places).enumerate() {
         if let Some(at) = at {
@@ -79,15 +100,31 @@ fn body(tree: &ModelTree, shapes: &mut Shapes, found: &mut Diagnostics) -> Body 
             read_link((link, at), tree, body, &mut meshes, shapes, found);
         }
     }
+    for (idx, body) in bodies.iter_mut().enumerate() {
+        let own = (0..tree.links.len()).filter(|link| assembly.body_of(*link) == idx);
+        material(&own.collect::<Vec<_>>(), body, found);
+    }
     let names: Vec<&str> = tree.links.iter().map(|link| link.name.as_str()).collect();
-    let mut whole = assembly.attach(bodies, &names, found);
-    whole.friction = friction(tree, found);
-    whole
+    let (whole, parts) = assembly.attach(bodies, &names, found);
+    let mut frames = BTreeMap::new();
+    for (idx, (name, at)) in names.iter().zip(&places).enumerate() {
+        let body = assembly.body_of(idx);
+        let carrier = match parts[body] {
+            Some(part) => Some(whole.moving[part].name.clone()),
+            None if body == 0 => Some(OWN.to_owned()),
+            None => None,
+        };
+        if let (Some(pose), Some(link)) = (at, carrier) {
+            let (pose, link) = (*pose, Some(link));
+            frames.insert((*name).to_owned(), Frame { pose, link });
+        }
+    }
+    (whole, frames)
 }
 
-/// The friction of an object: the largest of its shapes, as one number.
-fn friction(tree: &ModelTree, found: &mut Diagnostics) -> Option<f64> {
-    let solids = || tree.links.iter().flat_map(|link| &link.solids);
+/// The friction of a body: the largest of its shapes, as one number.
+fn friction(solids: &[&TreeSolid], found: &mut Diagnostics) -> Option<f64> {
+    let solids = || solids.iter().copied();
     if solids().all(|solid| solid.friction.is_none()) {
         return None;
     }
@@ -95,7 +132,7 @@ fn friction(tree: &ModelTree, found: &mut Diagnostics) -> Option<f64> {
     let most = solids().map(of).fold(0.0, f64::max);
     if let Some(other) = solids().find(|solid| of(solid) < most) {
         let message = format!(
-            "this geom has the friction {}, but the object has one friction here: its largest, {most}",
+            "this geom has the friction {}, but its body has one friction here: the largest, {most}",
             of(other)
         );
         warn(
@@ -117,11 +154,16 @@ fn warn(found: &mut Diagnostics, message: String, at: &SourceSpan, help: &str) {
 }
 
 /// Returns the pose of a link relative to the root, through its chain of joints.
-fn place(link: &TreeLink, tree: &ModelTree, found: &mut Diagnostics) -> Option<Isometry3<f64>> {
+/// `above` are the joints by their children.
+fn place(
+    link: &TreeLink,
+    above: &BTreeMap<&str, &TreeJoint>,
+    found: &mut Diagnostics,
+) -> Option<Isometry3<f64>> {
     let mut at = Isometry3::identity();
-    let mut name = &link.name;
+    let mut name = link.name.as_str();
     for _ in 0..LONGEST_CHAIN {
-        let Some(joint) = tree.joints.iter().find(|joint| joint.child == *name) else {
+        let Some(joint) = above.get(name) else {
             return Some(at);
         };
         at = joint.origin * at;
@@ -181,7 +223,9 @@ fn read_link(
     let turned = pose.rotation.to_rotation_matrix();
     let about_com = turned.matrix() * stated.about_com * turned.matrix().transpose();
     let possible = is_possible(&about_com);
-    if !possible {
+    // Those that no file states are computed without a word.
+    let is_unstated = stated.moments_place.is_none() && stated.about_com == Matrix3::zeros();
+    if !possible && !is_unstated {
         let message =
             "these moments of inertia are impossible: they are computed from the shapes instead";
         let place = stated.moments_place.as_ref().unwrap_or(&stated.place);

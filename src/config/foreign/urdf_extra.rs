@@ -3,11 +3,12 @@
 
 use std::collections::BTreeMap;
 
-use crate::foreign::body::{Mass, Role};
+use crate::foreign::body::Role;
 use crate::foreign::elements::{Children, refuse_switch, refuse_unless};
 use crate::foreign::sdf_surface::{Surface, drake_friction, isotropic};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::Span;
+use actcheck_data::TreeInertial;
 
 pub(crate) const ROBOT: Children = Children {
     read: &["link", "joint", "material", "gazebo"],
@@ -217,21 +218,17 @@ impl Contact {
         own.or(self.surface)
     }
 
-    /// Returns the mass of the link with scaled moments of inertia. Reports a factor without
-    /// moments (W035).
-    pub(crate) fn with_inertia(&self, mass: Mass, link: Node, reader: &mut Reader) -> Mass {
+    /// Scales the moments of inertia of the link. Reports a factor without moments (W035).
+    pub(crate) fn scale(&self, inertial: &mut TreeInertial, link: Node, reader: &mut Reader) {
         let Some(factor) = self.inertia_scaling.filter(|factor| *factor != 1.0) else {
-            return mass;
+            return;
         };
-        if mass.about_com.is_none() {
+        if inertial.moments_place.is_none() {
             let message = "`<inertia_scaling>` needs an `<inertia>`".to_owned();
             let help = "add the moments of inertia, or remove the factor";
             reader.error("W035", link, message, help);
         }
-        Mass {
-            about_com: mass.about_com.map(|moments| moments * factor),
-            ..mass
-        }
+        inertial.about_com *= factor;
     }
 }
 

@@ -2,14 +2,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use crate::foreign::geometry::{KINDS, kind_of};
-use crate::foreign::urdf::origin;
+use crate::foreign::geometry::{KINDS, cone, kind_of};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostics, did_you_mean};
 use actcheck_data::{
-    ModelTree, TreeGeometry, TreeInertial, TreeJoint, TreeLink, TreeMimic, TreeMotion, TreeSolid,
+    Mesh, ModelTree, TreeGeometry, TreeInertial, TreeJoint, TreeLink, TreeMimic, TreeMotion,
+    TreeSolid,
 };
 
 /// Supported joint types.
@@ -30,6 +30,8 @@ const SINGLE: [&str; 8] = [
 /// A tree, and the faults of shapes that are only seen: they matter if such a shape has to collide.
 pub(crate) struct UrdfTree {
     pub(crate) tree: ModelTree,
+    /// Whether the links form one tree.
+    pub(crate) is_whole: bool,
     pub(crate) faults_of_visuals: BTreeMap<String, Diagnostics>,
 }
 
@@ -54,36 +56,47 @@ pub(crate) fn read(root: Node, reader: &mut Reader) -> UrdfTree {
             continue;
         }
         let mut unheard = Reader::new(reader.source);
-        let visuals = solids(link, "visual", &mut unheard);
+        let meshes = &mut tree.inline_meshes;
+        let visuals = solids((link, "visual"), meshes, &mut unheard);
         if !unheard.found.is_empty() {
             faults_of_visuals.insert(name.to_owned(), unheard.found);
         }
         tree.links.push(TreeLink {
             name: name.to_owned(),
             inertial: inertial(link, reader),
-            solids: solids(link, "collision", reader),
+            solids: solids((link, "collision"), meshes, reader),
             visuals,
             place: reader.place(link),
         });
     }
-    if tree.links.is_empty() {
+    let is_whole = if tree.links.is_empty() {
         reader.error(
             "W051",
             root,
             "the robot has no links".to_owned(),
             "add `<link name=\"base_link\"/>`",
         );
+        false
     } else {
-        read_joints(root, &names, &mut tree, reader);
+        let is_whole = read_joints(root, &names, &mut tree, reader);
         read_passing(root, &mut tree, reader);
-    }
+        is_whole
+    };
     UrdfTree {
         tree,
+        is_whole,
         faults_of_visuals,
     }
 }
 
-fn read_joints(root: Node, links: &BTreeSet<&str>, tree: &mut ModelTree, reader: &mut Reader) {
+/// Reads all joints. Returns whether the links form one tree.
+fn read_joints(
+    root: Node,
+    links: &BTreeSet<&str>,
+    tree: &mut ModelTree,
+    reader: &mut Reader,
+) -> bool {
+    let mut is_whole = true;
     // Joint and parent link by child link.
     let mut above: BTreeMap<&str, (Node, &str)> = BTreeMap::new();
     let mut names = BTreeSet::new();
@@ -104,9 +117,11 @@ fn read_joints(root: Node, links: &BTreeSet<&str>, tree: &mut ModelTree, reader:
         let ends = [parent, child].map(Option::unwrap_or_default);
         tree.joints.push(read_joint(joint, name, ends, reader));
         let (Some(parent), Some(child)) = (parent, child) else {
+            is_whole = false;
             continue;
         };
         if above.insert(child, (joint, parent)).is_some() {
+            is_whole = false;
             let message = format!("the link `{child}` is the child of two joints");
             reader.error(
                 "W051",
@@ -116,7 +131,7 @@ fn read_joints(root: Node, links: &BTreeSet<&str>, tree: &mut ModelTree, reader:
             );
         }
     }
-    check_tree(root, links, &above, reader);
+    check_tree(root, links, &above, reader) && is_whole
 }
 
 /// Reads the pairs of links of `<disable_collisions>`: elements of SRDF, which some tools write
@@ -176,6 +191,18 @@ fn warn_about_repeated(joint: Node, reader: &mut Reader) {
     }
 }
 
+/// Reads the `<origin>` of an element; the identity if it has none.
+fn origin(node: Node, reader: &mut Reader) -> Option<Isometry3<f64>> {
+    let Some(written) = xml::child(node, "origin") else {
+        return Some(Isometry3::identity());
+    };
+    let mut three = |name: &str| match written.attribute(name) {
+        Some(text) => reader.numbers(written, text, Bound::Finite),
+        None => Some([0.0; 3]),
+    };
+    Some(xml::placed(three("xyz")?, three("rpy")?))
+}
+
 /// Reads the mass of a link; `None` if it has none, or after a fault. Moments that are missing are
 /// 0.
 fn inertial(link: Node, reader: &mut Reader) -> Option<TreeInertial> {
@@ -209,8 +236,12 @@ fn inertial(link: Node, reader: &mut Reader) -> Option<TreeInertial> {
 }
 
 /// Reads the shapes of a link in elements of this name. Those that are only placeholders are
-/// reported (W036).
-fn solids(link: Node, element: &str, reader: &mut Reader) -> Vec<TreeSolid> {
+/// reported (W036). Shapes without a mesh file get entries in `meshes`.
+fn solids(
+    (link, element): (Node, &str),
+    meshes: &mut BTreeMap<String, Mesh>,
+    reader: &mut Reader,
+) -> Vec<TreeSolid> {
     let mut found = Vec::new();
     for node in xml::children(link, element) {
         if let Some(shape) = placeholder(node) {
@@ -224,7 +255,7 @@ fn solids(link: Node, element: &str, reader: &mut Reader) -> Vec<TreeSolid> {
         }
         let pose = origin(node, reader);
         let geometry = reader.required(node, "geometry");
-        let geometry = geometry.and_then(|node| Some((node, read_geometry(node, reader)?)));
+        let geometry = geometry.and_then(|node| Some((node, read_geometry(node, meshes, reader)?)));
         let (Some(pose), Some((node, geometry))) = (pose, geometry) else {
             continue;
         };
@@ -245,7 +276,7 @@ fn placeholder(collision: Node) -> Option<Node> {
     let shape = xml::first(xml::child(collision, "geometry")?)?;
     let keys: &[&str] = match shape.tag_name().name() {
         "box" => &["size"],
-        "cylinder" | "capsule" => &["radius", "length"],
+        "cylinder" | "capsule" | "cone" => &["radius", "length"],
         "sphere" => &["radius"],
         _ => return None,
     };
@@ -259,7 +290,11 @@ fn placeholder(collision: Node) -> Option<Node> {
     keys.iter().all(is_zero).then_some(shape)
 }
 
-fn read_geometry(geometry: Node, reader: &mut Reader) -> Option<TreeGeometry> {
+fn read_geometry(
+    geometry: Node,
+    meshes: &mut BTreeMap<String, Mesh>,
+    reader: &mut Reader,
+) -> Option<TreeGeometry> {
     let kind = kind_of(geometry, reader)?;
     let number = |name: &str, reader: &mut Reader| {
         let written = reader.attribute(kind, name)?;
@@ -282,6 +317,15 @@ fn read_geometry(geometry: Node, reader: &mut Reader) -> Option<TreeGeometry> {
                 TreeGeometry::Cylinder { radius, length }
             } else {
                 TreeGeometry::Capsule { radius, length }
+            })
+        }
+        "cone" => {
+            let (radius, length) = (number("radius", reader), number("length", reader));
+            let name = format!("cone {}", meshes.len());
+            meshes.insert(name.clone(), cone(radius?, length?)?);
+            Some(TreeGeometry::Mesh {
+                file: name,
+                scale: [1.0; 3],
             })
         }
         "mesh" => {
@@ -326,7 +370,14 @@ fn read_joint(joint: Node, name: &str, ends: [&str; 2], reader: &mut Reader) -> 
 fn moving(joint: Node, fixed: TreeJoint, reader: &mut Reader) -> Option<TreeJoint> {
     let kind = reader.attribute(joint, "type")?;
     let motion = match kind {
-        "fixed" => return Some(fixed),
+        "fixed" => {
+            if let Some(mimic) = xml::child(joint, "mimic") {
+                let message = format!("the joint `{}` is fixed: it follows no other", fixed.name);
+                let help = "remove the `<mimic>`, or make the joint `revolute` or `prismatic`";
+                reader.warning("W036", mimic, message, help);
+            }
+            return Some(fixed);
+        }
         "planar" => TreeMotion::Planar,
         "floating" => TreeMotion::Floating,
         "prismatic" => TreeMotion::Prismatic,
@@ -368,6 +419,15 @@ fn moving(joint: Node, fixed: TreeJoint, reader: &mut Reader) -> Option<TreeJoin
     }
     let limit = reader.required(joint, "limit")?;
     (read.effort, read.velocity) = efforts(limit, reader);
+    if motion == TreeMotion::Revolute
+        && ["lower", "upper"]
+            .into_iter()
+            .all(|key| limit.attribute(key).is_some_and(is_infinite))
+    {
+        (read.lower, read.upper) = (f64::NEG_INFINITY, f64::INFINITY);
+        read.motion = TreeMotion::Continuous;
+        return Some(read);
+    }
     let mut end = |key: &str| match limit.attribute(key) {
         Some(written) => reader
             .numbers::<1>(limit, written, Bound::Finite)
@@ -387,11 +447,15 @@ fn moving(joint: Node, fixed: TreeJoint, reader: &mut Reader) -> Option<TreeJoin
     Some(read)
 }
 
+fn is_infinite(written: &str) -> bool {
+    written.trim().parse::<f64>().is_ok_and(f64::is_infinite)
+}
+
 /// Reads the largest effort and velocity: 0 if they are unknown. A limit of -1 means none, as in
-/// SDF.
+/// SDF, and so does an infinite one.
 fn efforts(limit: Node, reader: &mut Reader) -> (f64, f64) {
     let mut number = |key: &str| match limit.attribute(key).map(str::trim) {
-        Some(written) if written.parse() != Ok(-1.0) => reader
+        Some(written) if written.parse() != Ok(-1.0) && !is_infinite(written) => reader
             .numbers::<1>(limit, written, Bound::NotNegative)
             .map_or(0.0, |[number]| number),
         _ => 0.0,
@@ -453,13 +517,15 @@ fn end<'n>(
     Some(link)
 }
 
-/// Checks that there are one root and no cycles.
+/// Checks that there are one root and no cycles. Returns whether that is so.
 fn check_tree(
     root: Node,
     links: &BTreeSet<&str>,
     above: &BTreeMap<&str, (Node, &str)>,
     reader: &mut Reader,
-) {
+) -> bool {
+    // Faulty joints make connected links look disconnected.
+    let is_faulty = reader.found.has_errors();
     let mut circles: BTreeSet<&str> = BTreeSet::new();
     for start in links {
         let mut seen = BTreeSet::new();
@@ -487,8 +553,7 @@ fn check_tree(
         .copied()
         .filter(|link| !above.contains_key(link))
         .collect();
-    // Faulty joints make connected links look disconnected.
-    if roots.len() > 1 && !reader.found.has_errors() {
+    if roots.len() > 1 && !is_faulty {
         let message = format!(
             "the links form {} trees, with the roots `{}`",
             roots.len(),
@@ -501,4 +566,5 @@ fn check_tree(
             "links form one tree: join them with joints of the type `fixed`",
         );
     }
+    circles.is_empty() && roots.len() == 1
 }

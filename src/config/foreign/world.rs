@@ -10,7 +10,9 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use crate::foreign::body::{Body, Role};
 use crate::foreign::building::{self, Solid, Split};
 use crate::foreign::elements::Children;
+use crate::foreign::folder::{self, Including};
 use crate::foreign::geometry::Shapes;
+use crate::foreign::inclusions::Inclusions;
 use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::nested::{SubModel, Tree, check_include, register};
@@ -18,9 +20,9 @@ use crate::foreign::sdf::check_version;
 use crate::foreign::sdf_pose::pose;
 use crate::foreign::world_state::{ModelState, WorldState};
 use crate::foreign::xml::{self, Bound, Node, Reader};
-use crate::foreign::{folder, fronts, mjcf_world, sdf, tree_object};
+use crate::foreign::{fronts, mjcf_world, sdf, tree_object};
 use crate::{Furniture, WorldMap};
-use actcheck_base::{Diagnostics, Severity, Source, Span, digest_of};
+use actcheck_base::{Diagnostics, Severity, Source, SourceSpan, digest_of};
 use actcheck_data::{FLOOR_M, ObjectModel, Pose};
 
 /// Light, display and time steps do not affect a world; in Gazebo, too, roads and actors do not
@@ -114,6 +116,7 @@ pub(crate) fn read(
         pieces: Vec::new(),
         whole: Vec::new(),
         links: BTreeMap::new(),
+        inclusions: Inclusions::of_world(),
         reader: Reader::new(source),
     };
     let root = document.root_element();
@@ -138,11 +141,12 @@ struct WorldReader<'a> {
     world: World,
     /// All models of the world, before buildings are split and floors are left out, with their
     /// elements in the text.
-    pieces: Vec<(Furniture, Span)>,
+    pieces: Vec<(Furniture, SourceSpan)>,
     /// Furniture other than the solids of buildings: its index, and its element in the text.
-    whole: Vec<(usize, Span)>,
+    whole: Vec<(usize, SourceSpan)>,
     /// Poses of the links of included models, each in the frame of its model, by the URIs.
     links: BTreeMap<String, BTreeMap<String, Isometry3<f64>>>,
+    inclusions: Inclusions,
     reader: Reader<'a>,
 }
 
@@ -176,8 +180,8 @@ impl WorldReader<'_> {
                 true => self.inline(child, moved),
                 false => self.include(child, moved),
             };
-            self.pieces
-                .extend(piece.map(|piece| (piece, xml::span(child))));
+            let place = self.reader.located(xml::span(child));
+            self.pieces.extend(piece.map(|piece| (piece, place)));
         }
         state.warn_of_others(&known, &mut self.reader);
     }
@@ -213,8 +217,13 @@ impl WorldReader<'_> {
     /// Reads an included model as it is in a world. Returns `None` after it has reported a fault.
     fn included(&mut self, uri: Node) -> Option<SubModel> {
         let known = self.included.models.keys().map(String::as_str);
+        let file = Including {
+            path: self.path,
+            lookup: self.included.lookup,
+            inclusions: &self.inclusions,
+        };
         let role = (Role::Furniture, true);
-        folder::included(uri, self.included.lookup, role, 1, known, &mut self.reader)
+        folder::included(uri, &file, role, known, &mut self.reader)
     }
 
     /// Adds all models. If slabs are the floor of the world, everything is moved down until their
@@ -226,7 +235,7 @@ impl WorldReader<'_> {
             .map(|(piece, _)| self.top_of_slab(piece))
             .collect();
         let floor_m = self.height_of_floor(&pieces, &tops);
-        if let Some((top_m, (piece, span))) = floor_m.and_then(|top_m| {
+        if let Some((top_m, (piece, place))) = floor_m.and_then(|top_m| {
             let slab = tops.iter().position(|top| *top == Some(top_m))?;
             Some((top_m, &pieces[slab]))
         }) {
@@ -235,16 +244,13 @@ impl WorldReader<'_> {
                 piece.name,
                 100.0 * top_m
             );
-            self.reader.warning_at(
-                "W036",
-                span.clone(),
-                message,
-                "the floor of every world is at the height 0",
-            );
+            let place = place.clone();
+            let help = "the floor of every world is at the height 0";
+            self.reader.warning_in("W036", place, message, help);
         }
-        for (mut piece, span) in pieces {
+        for (mut piece, place) in pieces {
             piece.pose.position[2] -= floor_m.unwrap_or(0.0);
-            self.add(piece, span);
+            self.add(piece, place);
         }
     }
 
@@ -261,7 +267,11 @@ impl WorldReader<'_> {
 
     /// The height of slabs on which more than half of the models around the origin are, if there
     /// are such slabs.
-    fn height_of_floor(&self, pieces: &[(Furniture, Span)], tops: &[Option<f64>]) -> Option<f64> {
+    fn height_of_floor(
+        &self,
+        pieces: &[(Furniture, SourceSpan)],
+        tops: &[Option<f64>],
+    ) -> Option<f64> {
         let is_on = |at: [f64; 3], slab: &Furniture| {
             let local = slab.pose.to_isometry().inverse() * Point3::from(at);
             let size = self
@@ -300,7 +310,7 @@ impl WorldReader<'_> {
         own.or_else(|| self.included.models.get(name).map(|model| &**model))
     }
 
-    fn add(&mut self, piece: Furniture, span: Span) {
+    fn add(&mut self, piece: Furniture, place: SourceSpan) {
         let own = self
             .world
             .models
@@ -315,12 +325,8 @@ impl WorldReader<'_> {
                 "`{}` rises less than 5 mm above the floor, and is left out",
                 piece.name
             );
-            self.reader.warning_at(
-                "W036",
-                span,
-                message,
-                "robots drive over carpets and markings",
-            );
+            let help = "robots drive over carpets and markings";
+            self.reader.warning_in("W036", place, message, help);
             if let Some(idx) = own {
                 self.world.models.remove(idx);
             }
@@ -328,7 +334,7 @@ impl WorldReader<'_> {
         }
         let [x, y, z] = piece.pose.position;
         if libm::hypot(x, y).max(z) > FARTHEST_M && !model.is_some_and(building::is_large) {
-            return self.leave_out_distant(&piece, own, span);
+            return self.leave_out_distant(&piece, own, place);
         }
         match model.map(|model| building::solids(model, &piece.pose.to_isometry())) {
             Some(Split::Solids(solids)) => {
@@ -338,7 +344,7 @@ impl WorldReader<'_> {
                 if let Some(idx) = own {
                     self.world.models.remove(idx);
                 }
-                return self.add_solids(&piece, &building, solids, &span);
+                return self.add_solids(&piece, &building, solids, &place);
             }
             Some(Split::TooMany(count)) => {
                 let message = format!(
@@ -349,23 +355,23 @@ impl WorldReader<'_> {
                     "give it a collision mesh of fewer flat faces; it has {count}, and at most {} become obstacles of their own",
                     building::MOST_SOLIDS
                 );
-                self.reader.warning_at("W036", span.clone(), message, help);
+                self.reader.warning_in("W036", place.clone(), message, help);
             }
             Some(Split::Whole) | None => {}
         }
         self.whole
-            .push((self.world.map.furniture.len(), span.clone()));
-        self.add_piece(piece, span);
+            .push((self.world.map.furniture.len(), place.clone()));
+        self.add_piece(piece, place);
     }
 
-    fn leave_out_distant(&mut self, piece: &Furniture, own: Option<usize>, span: Span) {
+    fn leave_out_distant(&mut self, piece: &Furniture, own: Option<usize>, place: SourceSpan) {
         let [x, y, z] = piece.pose.position;
         let message = format!(
             "`{}` at ({x:.1}, {y:.1}, {z:.1}) is beyond the end of the floor, and is left out",
             piece.name
         );
-        self.reader
-            .warning_at("W036", span, message, "the floor ends 14 m from the origin");
+        let help = "the floor ends 14 m from the origin";
+        self.reader.warning_in("W036", place, message, help);
         if let Some(idx) = own {
             self.world.models.remove(idx);
         }
@@ -379,8 +385,8 @@ impl WorldReader<'_> {
             .whole
             .iter()
             .find(|(idx, _)| without.contains(idx))
-            .map(|(_, span)| span.clone());
-        if let Some(span) = place {
+            .map(|(_, place)| place.clone());
+        if let Some(place) = place {
             let names: Vec<String> = without
                 .iter()
                 .map(|idx| format!("`{}`", self.world.map.furniture[*idx].name))
@@ -391,11 +397,11 @@ impl WorldReader<'_> {
             );
             let help =
                 "a place 0.69 m from the surface must be 0.4 m away from all other furniture";
-            self.reader.warning_at("W036", span, message, help);
+            self.reader.warning_in("W036", place, message, help);
         }
     }
 
-    fn add_piece(&mut self, piece: Furniture, span: Span) {
+    fn add_piece(&mut self, piece: Furniture, place: SourceSpan) {
         if self
             .world
             .map
@@ -404,8 +410,8 @@ impl WorldReader<'_> {
             .any(|other| other.name == piece.name)
         {
             let message = format!("there are two `{}`", piece.name);
-            self.reader
-                .error_at("W041", span, message, "give one of them another name");
+            let help = "give one of them another name";
+            self.reader.error_in("W041", place, message, help);
         }
         self.world.map.furniture.push(piece);
     }
@@ -417,7 +423,7 @@ impl WorldReader<'_> {
         piece: &Furniture,
         building: &ObjectModel,
         solids: Vec<Solid>,
-        span: &Span,
+        place: &SourceSpan,
     ) {
         for (number, solid) in (1..).zip(solids) {
             let (friction, restitution) = (Some(building.friction), Some(building.restitution));
@@ -430,7 +436,7 @@ impl WorldReader<'_> {
             };
             let digest = digest_of(&format!("{} {number}", building.digest));
             let placed = self.place(body, digest, &solid.at, &format!("{}_{number}", piece.name));
-            self.add_piece(placed, span.clone());
+            self.add_piece(placed, place.clone());
         }
     }
 
@@ -438,7 +444,10 @@ impl WorldReader<'_> {
     /// left out: every world has a floor, and lights and pictures do not collide.
     fn inline(&mut self, model: Node, state: Option<ModelState>) -> Option<Furniture> {
         let name = self.reader.attribute(model, "name")?;
-        let mut shapes = Shapes::new(self.included.lookup, self.path);
+        let mut shapes = Shapes {
+            inclusions: self.inclusions.clone(),
+            ..Shapes::new(self.included.lookup, self.path)
+        };
         shapes
             .digest
             .update(self.reader.source.text[model.range()].as_bytes());
@@ -463,12 +472,13 @@ impl WorldReader<'_> {
             return None;
         }
         let is_still = sdf::is_static(model, &mut self.reader);
-        self.warn_if_movable(is_still, name, model);
+        let place = self.reader.located(xml::span(model));
+        self.warn_if_movable(is_still, name, place);
         Some(self.place(body, shapes.digest.finish(), &at, name))
     }
 
     fn include(&mut self, include: Node, state: Option<ModelState>) -> Option<Furniture> {
-        check_include(include, &mut self.reader);
+        check_include(include, |_| false, &mut self.reader);
         if self.reader.boolean_attribute(include, "merge") != Some(false) {
             let message = "a world that is merged into another one can't be read".to_owned();
             let help = "write its models here, or include a model without `merge`";
@@ -490,7 +500,8 @@ impl WorldReader<'_> {
             && (model.moving.is_empty() || !is_still)
         {
             let foot = at * Point3::from(model.origin_m.map(|x| -x));
-            self.warn_if_movable(is_still || model.fixed, &named, include);
+            let place = self.reader.located(xml::span(include));
+            self.warn_if_movable(is_still || model.fixed, &named, place);
             // A model's origin is below its middle; the file's origin may differ.
             return Some(Furniture {
                 name,
@@ -511,7 +522,8 @@ impl WorldReader<'_> {
         if body.parts.is_empty() {
             return None;
         }
-        self.warn_if_movable(is_still || model.is_static, &named, include);
+        let place = self.reader.located(xml::span(include));
+        self.warn_if_movable(is_still || model.is_static, &named, place);
         Some(self.place(body, model.digest, &at, &name))
     }
 
@@ -526,7 +538,8 @@ impl WorldReader<'_> {
     ) -> Option<Arc<ObjectModel>> {
         let model = Arc::clone(self.included.models.get(named)?);
         let is_upright = (at.rotation * Vector3::z()).z >= UPRIGHT_COSINE;
-        if !is_upright || self.included.posed.contains(named) {
+        let is_other = folder::is_beside(xml::text(uri), self.path, self.included.lookup);
+        if !is_upright || is_other || self.included.posed.contains(named) {
             return None;
         }
         let Some(state) = state else {
@@ -552,12 +565,19 @@ impl WorldReader<'_> {
             shapes.digest.update(text.text.as_bytes());
             shapes.digest.update(piece.name.as_bytes());
             let (model, said) = tree_object::read(&piece.tree, &mut shapes);
+            self.reader.found.extend(said);
             let solid = model.filter(|model| !model.body.parts.is_empty());
             let Some(mut model) = solid else {
-                self.reader.found.extend(said);
                 continue;
             };
-            self.warn_if_movable(!piece.moves, &piece.name, root);
+            // The first link of a piece is the frame of its body.
+            let place = piece.tree.links.first().map(|link| link.place.clone());
+            let place = place.unwrap_or_else(|| self.reader.place(root));
+            let place = SourceSpan {
+                span: xml::tag(&place),
+                ..place
+            };
+            self.warn_if_movable(!piece.moves, &piece.name, place.clone());
             model.body.fixed = true;
             let furniture = self.place(
                 model.body,
@@ -565,7 +585,7 @@ impl WorldReader<'_> {
                 &Isometry3::identity(),
                 &piece.name,
             );
-            self.pieces.push((furniture, xml::span(root)));
+            self.pieces.push((furniture, place));
         }
     }
 
@@ -586,11 +606,11 @@ impl WorldReader<'_> {
         piece
     }
 
-    fn warn_if_movable(&mut self, is_still: bool, name: &str, node: Node) {
+    fn warn_if_movable(&mut self, is_still: bool, name: &str, place: SourceSpan) {
         if !is_still {
             let message = format!("`{name}` can move in its file, but is static in a world here");
             let help = "put movable objects into `[surfaceObjects]` or `nav_obstacle_list`";
-            self.reader.warning("W036", node, message, help);
+            self.reader.warning_in("W036", place, message, help);
         }
     }
 }

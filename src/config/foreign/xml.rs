@@ -11,7 +11,7 @@ use actcheck_base::{Diagnostic, Diagnostics, Source, SourceSpan, Span, check_xml
 pub(crate) const LONGEST_MODEL: usize = 16 << 20;
 /// Largest number of elements of one of the kinds in [`PARTS`]: each is simulated, or compared with
 /// all others.
-const MOST_PARTS: usize = 1_000;
+pub(crate) const MOST_PARTS: usize = 1_000;
 /// Kinds of elements that models and worlds consist of.
 const PARTS: [&str; 6] = ["link", "joint", "collision", "include", "model", "frame"];
 /// Largest number of errors, and of warnings, that are reported for one file.
@@ -261,9 +261,20 @@ impl<'a> Reader<'a> {
         message: String,
         help: impl Into<String>,
     ) {
+        self.error_in(code, self.located(span), message, help);
+    }
+
+    /// Records an error about a place in any file.
+    pub(crate) fn error_in(
+        &mut self,
+        code: &'static str,
+        place: SourceSpan,
+        message: String,
+        help: impl Into<String>,
+    ) {
         self.n_errors += 1;
         if self.n_errors <= MOST_FAULTS {
-            let SourceSpan { source, span } = self.located(span);
+            let SourceSpan { source, span } = place;
             self.found.push(
                 Diagnostic::error(code, message)
                     .at(&source, span)
@@ -291,9 +302,20 @@ impl<'a> Reader<'a> {
         message: String,
         help: impl Into<String>,
     ) {
+        self.warning_in(code, self.located(span), message, help);
+    }
+
+    /// Records a warning about a place in any file.
+    pub(crate) fn warning_in(
+        &mut self,
+        code: &'static str,
+        place: SourceSpan,
+        message: String,
+        help: impl Into<String>,
+    ) {
         self.n_warnings += 1;
         if self.n_warnings <= MOST_FAULTS {
-            let SourceSpan { source, span } = self.located(span);
+            let SourceSpan { source, span } = place;
             self.found.push(
                 Diagnostic::warning(code, message)
                     .at(&source, span)
