@@ -18,6 +18,7 @@ mod compare;
 mod config;
 mod consent;
 mod course_faults;
+mod cross_check;
 mod damage;
 mod dataset;
 mod departures;

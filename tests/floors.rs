@@ -196,3 +196,29 @@ fn every_folder_is_a_crate_in_the_table() {
         assert_eq!(name.as_str(), Some(format!("actcheck-{folder}").as_str()));
     }
 }
+
+/// The parts of a world don't know it: only its own file does.
+#[test]
+fn no_file_of_a_part_names_the_world() {
+    let mut n_files = 0;
+    for file in std::fs::read_dir(source_folder().join("world")).unwrap() {
+        let path = file.unwrap().path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let is_part = name.ends_with(".rs") && !name.ends_with("_tests.rs");
+        if !is_part || name == "lib.rs" || name == "simulation.rs" {
+            continue;
+        }
+        let text = std::fs::read_to_string(&path).unwrap();
+        let code = text
+            .lines()
+            .take_while(|line| *line != "mod tests {" && *line != "pub(super) mod tests {");
+        let mut code = code.filter(|line| !line.trim_start().starts_with("//"));
+        let names_it = |line: &&str| {
+            let mut words = line.split(|letter: char| !letter.is_alphanumeric());
+            words.any(|word| word == "World")
+        };
+        assert_eq!(code.find(names_it), None, "{name}");
+        n_files += 1;
+    }
+    assert!(n_files > 30, "{n_files} files");
+}

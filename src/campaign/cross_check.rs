@@ -69,7 +69,7 @@ impl RunInBoth {
 /// # Errors
 /// A name of a body can't be written.
 pub fn mapping_of(run: &PlayableRun, campaign: &str) -> Result<Mapping, Diagnostics> {
-    let quoted = |name: &str| toml::Value::String(name.to_owned()).to_string();
+    let quoted = actcheck_config::quoted;
     let list = |names: &[String]| {
         let names: Vec<String> = names.iter().map(|name| quoted(name)).collect();
         format!("[{}]", names.join(", "))

@@ -3,7 +3,7 @@
 //! The model is in the state of the run's first frame as it is loaded: joints have their position
 //! there as `ref`. Masses, inertias and shapes are those that were simulated. The actuators have
 //! the constants of the motors: their control is a setpoint plus its velocity times damping over
-//! stiffness. What has no equal in MuJoCo is approximated: the friction of a pair is the geometric
+//! stiffness. Frictions are approximated: the friction of a pair is the geometric
 //! mean of both in pairs of fingers or furniture with objects, which are listed, and the larger of
 //! both elsewhere.
 
@@ -471,7 +471,7 @@ fn part_joint(out: &mut Document, object: &SceneObject, played: &PlayedObject) {
 }
 
 fn inertial(mass: f64, com: &Vector3<f64>, tensor: &nalgebra::Matrix3<f64>) -> Attributes {
-    // A virtual link of a base has no mass. Its inertia is small beside that of what it carries.
+    // A virtual link of a base has no mass. The least inertia is small beside those of real links.
     let least = if tensor.diagonal().min() < LEAST_KG_M2 {
         LEAST_KG_M2
     } else {

@@ -50,7 +50,7 @@ pub struct PlayableRun {
     pub record: RunRecord,
 }
 
-/// Simulates a stored run again, and returns what another engine needs to play it.
+/// Simulates a stored run again, and returns the files with which another engine plays it.
 ///
 /// # Errors
 /// `S040` if the configuration has no such test; `S041` if the run can't be run again, or not to

@@ -1,6 +1,6 @@
 //! `actcheck compare`
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -77,11 +77,8 @@ pub fn compare(args: &CompareArgs) -> Result<u8, Diagnostics> {
     } else {
         Sampling::Fixed
     };
-    let comparison = compare_runs(
-        &first.runs,
-        &second.runs,
-        first.sampling.and(second.sampling).and(asked),
-    );
+    let comparison_sampling = first.sampling.and(second.sampling).and(asked);
+    let comparison = compare_runs(&first.runs, &second.runs, comparison_sampling);
     if comparison.pairs == 0 {
         return Err(nothing_shared(&first, &second, &comparison).into());
     }
@@ -93,6 +90,7 @@ pub fn compare(args: &CompareArgs) -> Result<u8, Diagnostics> {
         margin: args.margin,
         decide: args.decide,
         sequential: args.sequential,
+        without_contested: without_contested(&first, &second, comparison_sampling),
     };
     output::print(&match args.format {
         Format::Text => compare_text(&summary, output::page()),
@@ -100,6 +98,19 @@ pub fn compare(args: &CompareArgs) -> Result<u8, Diagnostics> {
         Format::Json => format!("{:#}\n", compare_json(&summary)),
     });
     Ok(summary.exit_code())
+}
+
+/// The comparison without the runs that another engine contests; `None` if there are none.
+fn without_contested(first: &Side, second: &Side, sampling: Sampling) -> Option<Comparison> {
+    let confirmed = |side: &Side| -> Vec<ComparedRun> {
+        let runs = side.runs.iter();
+        runs.filter(|run| !side.contested.contains(&run.run))
+            .cloned()
+            .collect()
+    };
+    let (one, other) = (confirmed(first), confirmed(second));
+    let is_smaller = one.len() < first.runs.len() || other.len() < second.runs.len();
+    is_smaller.then(|| compare_runs(&one, &other, sampling))
 }
 
 /// The inputs that differ between two sides.
@@ -168,6 +179,8 @@ pub(super) struct Side {
     name: String,
     pub(super) record: CampaignRecord,
     pub(super) runs: Vec<ComparedRun>,
+    /// Ids of the runs whose verdict another engine contests.
+    contested: BTreeSet<String>,
     /// Number of runs, also of those without a known scene.
     count: u64,
     /// How this number was decided.
@@ -218,6 +231,7 @@ impl Side {
             name: text.to_owned(),
             record,
             runs: collected.sorted(),
+            contested: history.contested()?.into_keys().collect(),
             count,
             sampling,
         })

@@ -419,7 +419,7 @@ struct SummarisedRun {
     flips_here: BTreeMap<String, BTreeSet<String>>,
     /// For each setting but the plain one, the properties that it decides otherwise than that.
     flips_there: BTreeMap<String, BTreeSet<String>>,
-    /// What the explanations of both engines say of the properties that differ.
+    /// The properties that differ, each with its explanation here and there.
     words: Vec<(String, String, String)>,
 }
 
@@ -734,7 +734,7 @@ impl Summary {
         })
     }
 
-    /// What the history keeps.
+    /// The part that the history keeps.
     fn record(&self) -> CrossCheck {
         CrossCheck {
             campaign: self.campaign.clone(),

@@ -12,7 +12,7 @@ use crate::{
 };
 use actcheck_base::set_program_digest;
 
-/// Options of `export run` that name what is written: `export RUN --mjcf DIR` is short for
+/// Options of `export run` that name a kind of file: `export RUN --mjcf DIR` is short for
 /// `export run RUN --mjcf DIR`.
 const WRITES_A_RUN: [&str; 2] = ["--mjcf", "--setpoints"];
 

@@ -91,6 +91,7 @@ impl Gate {
             margin: MARGIN,
             decide: false,
             sequential: true,
+            without_contested: None,
         })
     }
 }

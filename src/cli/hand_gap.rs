@@ -3,7 +3,8 @@
 
 use std::fmt::Write as _;
 
-use crate::new_robot::{numbers, quoted};
+use crate::new_robot::numbers;
+use actcheck_config::quoted;
 use actcheck_base::{Diagnostic, Source};
 use actcheck_campaign::{FingerJoint, UnknownHand};
 

@@ -129,16 +129,28 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
             .iter()
             .map(|name| names::local(name).to_owned()),
     );
+    let contested = history.contested()?;
+    let any_contested = runs.iter().any(|row| contested.contains_key(&row.run));
+    if any_contested {
+        table.columns.push("contested".to_owned());
+    }
+    let contested_in = |run: &String| -> Value {
+        let names = contested.get(run).into_iter().flatten();
+        let names: Vec<&str> = names.map(String::as_str).collect();
+        names.join(", ").into()
+    };
     let row = |row: &RunRow| -> Vec<Value> {
         let words = words
             .get(&row.run)
             .into_iter()
             .flatten()
             .map(|words| words.as_str().into());
+        let contested = any_contested.then(|| contested_in(&row.run));
         shown
             .iter()
             .map(|(.., cell)| cell(row))
             .chain(words)
+            .chain(contested)
             .collect()
     };
     // The rows of all runs together would take a gigabyte for each million.

@@ -9,6 +9,7 @@ use crate::new_files::NewFiles;
 use crate::{hand_gap, output};
 use actcheck_base::{Diagnostics, Files, ShellLine, Source};
 use actcheck_campaign::{Proposal, UnknownHand, proposed_robot};
+use actcheck_config::quoted;
 use actcheck_config::robot;
 use actcheck_data::RobotProfile;
 
@@ -260,11 +261,6 @@ fn seen_from(folder: &Path, path: &Path) -> String {
             .display()
             .to_string(),
     }
-}
-
-/// A basic string of TOML.
-pub(super) fn quoted(text: &str) -> String {
-    format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
 }
 
 fn list(names: &[String]) -> String {

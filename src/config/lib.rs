@@ -47,4 +47,5 @@ pub use step::Step;
 pub use table::Table;
 pub use template::{CampaignTemplate, LinksOntology, campaign_template, link_ontology};
 pub use value::Located;
+pub use words::quoted;
 pub use world_map::{Furniture, Wall, WorldMap};

@@ -48,3 +48,8 @@ pub(super) fn example(key: &str, expected: &str) -> String {
     };
     format!("write it like `{key} = {value}`")
 }
+
+/// Returns a text as a string of TOML.
+pub fn quoted(text: &str) -> String {
+    toml::Value::from(text).to_string()
+}

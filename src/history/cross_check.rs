@@ -67,6 +67,28 @@ impl History {
         Ok(Some(check))
     }
 
+    /// Returns the contested runs of all cross-checks, each with the local names of its properties
+    /// that another engine, or one of its settings, decides otherwise.
+    ///
+    /// # Errors
+    /// `H002` if a file is damaged.
+    pub fn contested(&self) -> Result<BTreeMap<String, BTreeSet<String>>, Diagnostics> {
+        let below = Below::new(self.dir());
+        let folder = self.dir().join(FOLDER);
+        if below.kind(&folder).is_none() {
+            return Ok(BTreeMap::new());
+        }
+        let mut found = BTreeMap::new();
+        for file in below.files(&folder) {
+            let name = file.file_stem().and_then(|name| name.to_str());
+            if let Some(check) = name.map(|id| self.cross_check(id)).transpose()?.flatten() {
+                let contested = check.runs.into_iter();
+                found.extend(contested.filter(|(_, properties)| !properties.is_empty()));
+            }
+        }
+        Ok(found)
+    }
+
     fn cross_check_file(&self, campaign: &str) -> PathBuf {
         self.dir().join(FOLDER).join(format!("{campaign}.json"))
     }

@@ -53,7 +53,7 @@ pub struct Observation {
     pub loads: Vec<f64>,
 }
 
-/// What the robot is told, senses, knows and believes.
+/// The robot's commands, sensors, knowledge and beliefs.
 pub struct Drive {
     sensing: Sensing,
     /// Transform from the base's true pose to its believed pose. Frame: world.

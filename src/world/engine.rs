@@ -1,7 +1,7 @@
 //! The engine's part of a world: steps physics, with the mechanisms that the physics engine lacks,
 //! and finds faults.
 //!
-//! Never: knows what the robot believes, or records anything.
+//! Never: knows the robot's beliefs, or records anything.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 

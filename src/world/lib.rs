@@ -1,7 +1,7 @@
 //! Simulates a `Scene`: the only crate that uses the physics engine.
 //!
 //! A [`World`] has four parts: the [`Engine`] steps the bodies, the [`Drive`] is the robot's side,
-//! [`Proximity`] decides what the robot can touch in a tick, and the [`Recorder`] measures.
+//! [`Proximity`] decides which things the robot can touch in a tick, and the [`Recorder`] measures.
 //!
 //! Never: decides the robot's actions, judges success, or attaches an object to the hand by a
 //! constraint, other than the seal of a suction cup, which breaks beyond its limits.

@@ -1,4 +1,4 @@
-//! What another physics engine needs, beside the scene, to play the robot's part of a run: the
+//! The robot's part of a run for another physics engine, which knows the scene already: the
 //! motors with their setpoints in each control tick, the masses that are simulated, and the links
 //! that collide.
 

@@ -145,8 +145,8 @@ impl Proximity {
         self.shortcuts
     }
 
-    /// Returns the reach of the robot, with its links at these poses, in the next tick. `is_tied`
-    /// tells that the engine must move the whole robot because of a joint with something else.
+    /// Returns the reach of the robot, with its links at these poses, in the next tick. `is_tied`:
+    /// whether the engine must move the whole robot because of a joint with something else.
     pub(super) fn update(
         &mut self,
         bodies: &mut Bodies,

@@ -363,7 +363,7 @@ impl Recorder {
         Some(touches)
     }
 
-    /// Records what is recorded only with each frame, if this tick has one.
+    /// Records the quantities of frames, if this tick has a frame.
     pub(super) fn record_frame(&mut self, engine: &Engine, drive: &Drive) {
         if (self.n_ticks - self.began).is_multiple_of(self.ticks_per_frame) {
             self.frame(engine.bodies());

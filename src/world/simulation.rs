@@ -362,29 +362,4 @@ pub(super) mod tests {
             world.record();
         }
     }
-
-    /// `World` was one type over 25 files, which imported each other in a circle.
-    #[test]
-    fn no_file_of_a_part_names_the_world() {
-        let files = std::fs::read_dir(env!("CARGO_MANIFEST_DIR")).expect("the crate's folder");
-        let mut n_files = 0;
-        for path in files.map(|file| file.expect("it is readable").path()) {
-            let name = path.file_name().unwrap_or_default().to_string_lossy();
-            let is_part = name.ends_with(".rs") && !name.ends_with("_tests.rs");
-            if !is_part || name == "lib.rs" || name == "simulation.rs" {
-                continue;
-            }
-            let text = std::fs::read_to_string(&path).expect("it is text");
-            let code = text.lines().take_while(|line| *line != "mod tests {");
-            let code = code.take_while(|line| *line != "pub(super) mod tests {");
-            let mut code = code.filter(|line| !line.trim_start().starts_with("//"));
-            let names_it = |line: &&str| {
-                let mut words = line.split(|letter: char| !letter.is_alphanumeric());
-                words.any(|word| word == "World")
-            };
-            assert_eq!(code.find(names_it), None, "{name}");
-            n_files += 1;
-        }
-        assert!(n_files > 30, "{n_files} files");
-    }
 }

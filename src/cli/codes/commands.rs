@@ -457,7 +457,7 @@ const CODES_X: &[Code] = &[
     code(
         "X097",
         "labels can't be read",
-        "the file is no CSV file with the columns run, property and label, or it names a run or a property that the history lacks",
+        "the file is not a CSV file with the columns run, property and label, or it names a run or a property that the history lacks",
         "correct the line that the message names; labels are pass or fail",
     ),
 ];

@@ -28,6 +28,13 @@ pub fn compare_json(summary: &CompareSummary) -> Value {
             .map(of)
             .collect::<Vec<Value>>()
     });
+    let without_contested = summary.without_contested.as_ref().map(|found| {
+        let line = |line: &ComparedLine| {
+            let (action, property) = compared_parts(&line.of);
+            json!({ "action": action, "property": property, "table": line.table, "difference": line.difference })
+        };
+        json!({ "pairs": found.pairs, "lines": found.lines.iter().map(line).collect::<Vec<Value>>() })
+    });
     json!({
         "a": first,
         "b": second,
@@ -47,6 +54,8 @@ pub fn compare_json(summary: &CompareSummary) -> Value {
         "margin": summary.margin,
         "answer": summary.answer().word(),
         "worse": worse,
+        "sequential": summary.sequential,
+        "without_contested": without_contested,
     })
 }
 

@@ -52,6 +52,8 @@ pub struct CompareSummary {
     pub decide: bool,
     /// Whether tests that are valid at any look were asked for.
     pub sequential: bool,
+    /// The comparison without the runs that another engine contests; `None` if there are none.
+    pub without_contested: Option<Comparison>,
 }
 
 /// Significance level of the answer if none was given.

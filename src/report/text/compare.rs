@@ -22,6 +22,7 @@ pub fn compare_text(summary: &CompareSummary, page: Page) -> String {
     changes(&mut out, summary);
     out.push('\n');
     lines(&mut out, summary, page);
+    without_contested(&mut out, summary);
     flips(&mut out, summary);
     left_out(&mut out, summary);
     alone(&mut out, summary);
@@ -184,6 +185,28 @@ fn sequential(summary: &CompareSummary, lines: usize) -> String {
         probability(line.table.test().two_sided),
         probability(line.test.two_sided)
     )
+}
+
+/// The rates without the runs that another engine contests.
+fn without_contested(out: &mut String, summary: &CompareSummary) {
+    let Some(found) = &summary.without_contested else {
+        return;
+    };
+    let _ = writeln!(
+        out,
+        "\nwithout scenes whose verdict another engine contests ({} of {} are left)",
+        found.pairs, summary.comparison.pairs
+    );
+    for line in &found.lines {
+        let [a, b] = line.table.passed();
+        let _ = writeln!(
+            out,
+            "  {}: A {a}, B {b} of {}; B − A {} percent",
+            compared_name(&line.of),
+            line.table.pairs(),
+            difference(line)
+        );
+    }
 }
 
 fn difference(line: &ComparedLine) -> String {

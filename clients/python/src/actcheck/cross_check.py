@@ -173,7 +173,7 @@ class _Motors:
         limit, effort = run.limit[tick, columns], run.effort[tick, columns]
         pushed = np.isfinite(effort)
         if pushed.any():
-            # An effort instead of a position: what the motor's law adds is taken off again.
+            # An effort instead of a position: the effort of the motor's law is taken off again.
             own = self._stiffness * data.qpos[self._positions] + self._damping * data.qvel[self._speeds]
             control = np.where(pushed, (effort + own) / self._stiffness, control)
         self._model.actuator_forcerange[self._motors, 0], self._model.actuator_forcerange[self._motors, 1] = -limit, limit
@@ -181,7 +181,7 @@ class _Motors:
 
 
 class _Grips:
-    """What the fingers hold."""
+    """The object between the fingers."""
 
     #: Ticks for which a touch is remembered: MuJoCo drops the contacts of things that sleep, and a grip may slip for an instant.
     _MEMORY = 6
@@ -193,7 +193,7 @@ class _Grips:
         self._touched: list[list[set[int]]] = []
 
     def look(self, data: Any) -> None:
-        """Notes what each finger touches now."""
+        """Notes the objects that each finger touches now."""
         touched: list[set[int]] = [set(), set()]
         for contact in range(data.ncon):
             first, second = (int(self._owner[geom]) for geom in data.contact.geom[contact])
