@@ -76,7 +76,7 @@ pub(super) enum Purpose {
     World,
 }
 
-/// A model that has been read, and what a model that it is attached to needs to know.
+/// A model that has been read, with the data for a model that it is attached to.
 struct Built {
     tree: ModelTree,
     contacts: Contacts,
@@ -157,7 +157,7 @@ pub(super) fn with_model<T>(
     if said.has_errors() {
         return Err(said);
     }
-    // Whoever compares two models by their texts compares all of both.
+    // A caller that compares two models by their texts compares their attached models too.
     let attached = attached.take();
     let text = if attached.is_empty() {
         source
@@ -193,7 +193,7 @@ fn names_of_bodies(root: Node) -> BTreeSet<String> {
 pub(super) struct File<'a> {
     pub(super) path: &'a Path,
     pub(super) lookup: &'a Lookup<'a>,
-    /// What it and all models that it belongs to may still grow by.
+    /// The budget that it shares with all models that it belongs to.
     pub(super) budget: &'a Budget,
     /// Number of models that it is attached to.
     depth: usize,
@@ -290,7 +290,7 @@ impl Model<'_> {
         self.tree.joints.push(joint);
     }
 
-    /// Adds what depends on all bodies: the contacts between them, and the couplings of joints.
+    /// Adds the parts that depend on all bodies: contacts between them, and couplings of joints.
     fn finish(&mut self, root: Node, reader: &mut Reader) {
         let is_known = |body: &str| self.names.contains_key(body);
         if self.is_robot() {

@@ -17,7 +17,7 @@ const DEEPEST_BODY: usize = 200;
 /// Most included and attached files, each as often as it is read.
 const MOST_FILES: usize = 1_000;
 
-/// What has been read of a model and of all that is attached to it.
+/// The size of a model and of all models attached to it, as far as they have been read.
 #[derive(Debug, Default)]
 pub(super) struct Budget {
     bodies: Cell<usize>,
@@ -66,7 +66,7 @@ impl Budget {
     /// Counts a file and the length of its text.
     ///
     /// # Errors
-    /// What there is too much of.
+    /// A message with the exceeded limit.
     pub(super) fn file(&self, n_bytes: usize) -> Result<(), String> {
         self.files.set(self.files.get() + 1);
         self.bytes.set(self.bytes.get() + n_bytes);

@@ -563,7 +563,7 @@ impl Compiler {
             Some("false") => None,
             Some("true") => {
                 if !is_range {
-                    let message = format!("`{limited}` is true, but `{range}` is no range");
+                    let message = format!("`{limited}` is true, but `{range}` is not a range");
                     let help = "write two numbers, the smaller one first";
                     reader.error("W034", node, message, help);
                 }

@@ -15,7 +15,7 @@ pub(super) type Mimic = (String, f64, f64);
 pub(super) struct NamedJoint {
     pub(super) name: String,
     place: SourceSpan,
-    /// What the element does with it, and how it names it.
+    /// The use of the joint by the element, and the way in which the element names it.
     role: &'static str,
     key: &'static str,
 }

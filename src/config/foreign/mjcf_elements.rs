@@ -9,8 +9,8 @@ use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::did_you_mean;
 
 /// Each element as PARENT/ELEMENT, with its attributes; `*` for those that have no effect here.
-/// `body` stands for all elements that have the children of a body. (The schema of MuJoCo 3.3.1, as
-/// its function `mj_printSchema` prints it.)
+/// `body` means all elements that have the children of a body. (The schema of MuJoCo 3.3.1, as its
+/// function `mj_printSchema` prints it.)
 const SCHEMA: &str = include_str!("mjcf_schema.txt");
 
 /// Elements with the children of a body.
@@ -91,7 +91,7 @@ fn check_bodies(root: Node, purpose: Purpose, reader: &mut Reader) {
     let mut is_first = true;
     for body in root.descendants().filter(|node| node.has_tag_name("body")) {
         if body.attribute("mocap") == Some("true") {
-            let message = "this body is moved by a program (`mocap`), and stands still here";
+            let message = "this body is moved by a program (`mocap`), and does not move here";
             let help = "nothing moves it: leave it out if it is only a target";
             reader.warning("W036", body, message.to_owned(), help);
         }

@@ -51,7 +51,7 @@ struct MjcfBody {
     hinges: Vec<usize>,
 }
 
-/// What the bodies of a file are read with.
+/// The context in which the bodies of a file are read.
 struct Walk<'a, 'r> {
     compiler: &'a Compiler,
     budget: &'a Budget,

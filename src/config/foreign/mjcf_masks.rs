@@ -34,7 +34,7 @@ impl Mask {
         }
     }
 
-    /// Reports masks that are no whole numbers of 32 bits (W034).
+    /// Reports masks that are not whole numbers of 32 bits (W034).
     pub(super) fn check(geom: Node, attributes: &MjcfAttributes<'_>, reader: &mut Reader) {
         for name in ["contype", "conaffinity"] {
             let is_mask = |text: &str| text.parse::<i32>().is_ok();
@@ -56,7 +56,7 @@ impl Mask {
 /// Two bodies, by the names of their links in order.
 type Pair = [String; 2];
 
-/// What a model says about the contacts of its bodies.
+/// The settings of a model for the contacts of its bodies.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Contacts {
     /// The masks of each body's colliding geoms.
@@ -70,8 +70,8 @@ pub(super) struct Contacts {
 }
 
 impl Contacts {
-    /// Adds what the sections `<contact>` of a file say about bodies that are known, and warns of
-    /// others (W036).
+    /// Adds the settings in the sections `<contact>` of a file for bodies that are known, and warns
+    /// of other bodies (W036).
     pub(super) fn read(
         &mut self,
         root: Node,

@@ -148,14 +148,14 @@ fn words_for_numbers_are_faults() {
         ("limited=\"true\"", ""),
         ("range=\"0 0\" limited=\"true\"", ""),
     ] {
-        let said = text(&part(joint, geom), "").expect_err("it is no number");
+        let said = text(&part(joint, geom), "").expect_err("it is not a number");
         assert!(
             said.contains("W034") && said.contains("a.xml:1:"),
             "{joint} {geom}: {said}"
         );
     }
     for size in ["0.1 x", "nan", "inf", "-1", "0", "1e9"] {
-        let said = text(&format!("<geom size=\"{size}\"/>"), "").expect_err("it is no size");
+        let said = text(&format!("<geom size=\"{size}\"/>"), "").expect_err("it is not a size");
         assert!(said.contains("W034"), "{size}: {said}");
     }
     for sequence in ["xy", "abc", ""] {
@@ -164,7 +164,7 @@ fn words_for_numbers_are_faults() {
     }
 }
 
-/// An empty range is no limit, and one that is switched off does not count.
+/// An empty range is not a limit, and one that is switched off does not count.
 #[test]
 fn ranges_are_limits_as_in_mujoco() {
     let motion = |joint_says: &str, more: &str| {
@@ -331,7 +331,7 @@ fn meshes_are_named_from_the_right_folder() {
     assert_eq!(files, ["sub/meshes/t.stl", "/far/t.stl"]);
 }
 
-/// Numbers whose products are no numbers any more end in a fault, or in a model.
+/// Reading numbers whose products are not finite ends with a fault or a model.
 #[test]
 fn huge_numbers_end() {
     let mesh = |vertex: &str| {
@@ -412,8 +412,8 @@ fn large_meshes_are_read_once() {
     );
 }
 
-/// Attached bodies are pieces of a world, what is soft is refused, and a body that moves freely is
-/// found whatever says so.
+/// Attached bodies are pieces of a world, soft bodies are refused, and a body that moves freely is
+/// found however its joint is written.
 #[test]
 fn worlds_have_all_their_pieces() {
     let world = |bodies: &str| {
@@ -451,9 +451,10 @@ fn worlds_have_all_their_pieces() {
     assert!(soft.is_err_and(|said| said.contains("W035")));
 }
 
-/// What would change the model is an error, and what it works without is a warning.
+/// A feature that would change the model is an error, and one that the model works without is a
+/// warning.
 #[test]
-fn what_is_not_simulated_is_said() {
+fn features_that_are_not_simulated_are_reported() {
     let robots = [
         ("<bodyy/>", "", "W035"),
         ("", "<contacts/>", "W036"),

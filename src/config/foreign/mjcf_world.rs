@@ -86,7 +86,7 @@ fn pieces(
             match item.node.tag_name().name() {
                 "body" => named(item.name(), "body"),
                 "attach" => named(attached, "body"),
-                // Sites, cameras and lights, and what has been refused.
+                // Sites, cameras and lights, and refused elements.
                 _ => continue,
             }
         };

@@ -413,7 +413,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Parses the numbers of an attribute, of which there may be any number; reports W034 and returns
-    /// `None` if one of them is no finite number.
+    /// `None` if one of them is not a finite number.
     pub(crate) fn list(&mut self, node: Node, name: &str, text: &str) -> Option<Vec<f64>> {
         let words = text.split_whitespace();
         let numbers: Option<Vec<f64>> = words
