@@ -29,10 +29,22 @@ fn campaign(folder: &Path, config: &str, runs: &str) -> String {
     let made = actcheck(
         folder,
         &[
-            "run", config.to_str().unwrap(), "--runs", runs, "--seed", "5", "-q", "--history", "h",
+            "run",
+            config.to_str().unwrap(),
+            "--runs",
+            runs,
+            "--seed",
+            "5",
+            "-q",
+            "--history",
+            "h",
         ],
     );
-    assert!(matches!(made.status.code(), Some(0 | 1)), "{}", stderr(&made));
+    assert!(
+        matches!(made.status.code(), Some(0 | 1)),
+        "{}",
+        stderr(&made)
+    );
     let history = History::open_to_read(&folder.join("h")).unwrap();
     history.campaigns().unwrap()[0].id.clone()
 }
@@ -44,7 +56,15 @@ fn a_run_is_written_as_a_model_with_its_setpoints() {
     let run = format!("{id}-1");
     let written = actcheck(
         folder.path(),
-        &["export", &run, "--mjcf", "d", "--setpoints", "--history", "h"],
+        &[
+            "export",
+            &run,
+            "--mjcf",
+            "d",
+            "--setpoints",
+            "--history",
+            "h",
+        ],
     );
     assert!(written.status.success(), "{}", stderr(&written));
     let history = History::open_to_read(&folder.path().join("h")).unwrap();
@@ -59,7 +79,9 @@ fn a_run_is_written_as_a_model_with_its_setpoints() {
     for body in &trace.snapshots[0].bodies {
         let numbers = |name: &str| -> Vec<f64> {
             let text = bodies[body.id.as_str()].attribute(name).unwrap();
-            text.split(' ').map(|number| number.parse().unwrap()).collect()
+            text.split(' ')
+                .map(|number| number.parse().unwrap())
+                .collect()
         };
         assert_eq!(numbers("pos"), body.pose.position, "{}", body.id);
         let [x, y, z, w] = body.pose.rotation;
@@ -75,9 +97,17 @@ fn a_run_is_written_as_a_model_with_its_setpoints() {
     let rows: Vec<Vec<f64>> = table
         .lines()
         .skip(1)
-        .map(|line| line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect())
+        .map(|line| {
+            line.split(',')
+                .map(|cell| cell.parse().unwrap_or(f64::NAN))
+                .collect()
+        })
         .collect();
-    let secs: f64 = trace.actions.iter().map(|action| action.duration_secs).sum();
+    let secs: f64 = trace
+        .actions
+        .iter()
+        .map(|action| action.duration_secs)
+        .sum();
     assert_eq!(rows.len() as f64, (secs * 60.0).round());
     assert!((rows[59][0] - 1.0).abs() < 1e-12, "{}", rows[59][0]);
     let joints = &trace.snapshots[0].robot.joints;
@@ -89,7 +119,10 @@ fn a_run_is_written_as_a_model_with_its_setpoints() {
         "the base reached its last setpoint: {end:?}"
     );
     // The folder is not overwritten.
-    let again = actcheck(folder.path(), &["export", "run", &run, "--mjcf", "d", "--history", "h"]);
+    let again = actcheck(
+        folder.path(),
+        &["export", "run", &run, "--mjcf", "d", "--history", "h"],
+    );
     assert_eq!(again.status.code(), Some(2));
     assert!(stderr(&again).contains("X042"), "{}", stderr(&again));
 }
@@ -100,7 +133,14 @@ fn a_cup_has_no_model_for_mujoco() {
     let id = campaign(folder.path(), "suction_arm.toml", "1");
     let refused = actcheck(
         folder.path(),
-        &["export", &format!("{id}-1"), "--mjcf", "d", "--history", "h"],
+        &[
+            "export",
+            &format!("{id}-1"),
+            "--mjcf",
+            "d",
+            "--history",
+            "h",
+        ],
     );
     assert_eq!(refused.status.code(), Some(2));
     assert!(stderr(&refused).contains("S053"), "{}", stderr(&refused));
@@ -120,7 +160,10 @@ fn mujoco_loads_the_first_frame() {
         for number in 1..=2 {
             let run = format!("{id}-{number}");
             let model = format!("d{number}");
-            let written = actcheck(folder.path(), &["export", &run, "--mjcf", &model, "--history", "h"]);
+            let written = actcheck(
+                folder.path(),
+                &["export", &run, "--mjcf", &model, "--history", "h"],
+            );
             assert!(written.status.success(), "{}", stderr(&written));
             let loaded = Command::new(python)
                 .args(["-c", LOADED])
@@ -163,23 +206,52 @@ fn runs_are_judged_in_both_engines() {
     let python = python.to_str().unwrap();
     let checked = actcheck(
         folder.path(),
-        &["cross-check", &id, "--python", python, "--history", "h", "--format", "json"],
+        &[
+            "cross-check",
+            &id,
+            "--python",
+            python,
+            "--history",
+            "h",
+            "--format",
+            "json",
+        ],
     );
-    assert!(matches!(checked.status.code(), Some(0 | 1)), "{}", stderr(&checked));
+    assert!(
+        matches!(checked.status.code(), Some(0 | 1)),
+        "{}",
+        stderr(&checked)
+    );
     let found: Value = serde_json::from_str(&stdout(&checked)).unwrap();
     assert_eq!(found["all_properties"]["of"], 8, "{found:#}");
-    assert!(found["all_properties"]["agree"].as_u64().unwrap() >= 6, "{found:#}");
-    assert_eq!(found["properties"].as_array().unwrap().len(), 5, "all are decided");
+    assert!(
+        found["all_properties"]["agree"].as_u64().unwrap() >= 6,
+        "{found:#}"
+    );
+    assert_eq!(
+        found["properties"].as_array().unwrap().len(),
+        5,
+        "all are decided"
+    );
     assert_eq!(found["settings"].as_array().unwrap().len(), 5);
     let history = History::open_to_read(&folder.path().join("h")).unwrap();
     let check = history.cross_check(&id).unwrap().unwrap();
     assert_eq!(check.runs.len(), 8);
-    let imported = history.campaign(check.imported.as_deref().unwrap()).unwrap();
+    let imported = history
+        .campaign(check.imported.as_deref().unwrap())
+        .unwrap();
     assert!(imported.imported_from.unwrap().starts_with("MuJoCo "));
     // Imported runs can't be played again.
     let again = actcheck(
         folder.path(),
-        &["cross-check", &imported.id, "--python", python, "--history", "h"],
+        &[
+            "cross-check",
+            &imported.id,
+            "--python",
+            python,
+            "--history",
+            "h",
+        ],
     );
     assert_eq!(again.status.code(), Some(2));
     assert!(stderr(&again).contains("S054"), "{}", stderr(&again));
@@ -192,10 +264,21 @@ fn a_python_without_mujoco_is_named() {
     let id = campaign(folder.path(), "pick.toml", "1");
     let refused = actcheck(
         folder.path(),
-        &["cross-check", &id, "--python", "no-such-python", "--history", "h"],
+        &[
+            "cross-check",
+            &id,
+            "--python",
+            "no-such-python",
+            "--history",
+            "h",
+        ],
     );
     assert_eq!(refused.status.code(), Some(2));
-    assert!(stderr(&refused).contains("no-such-python"), "{}", stderr(&refused));
+    assert!(
+        stderr(&refused).contains("no-such-python"),
+        "{}",
+        stderr(&refused)
+    );
     let history = History::open_to_read(&folder.path().join("h")).unwrap();
     assert_eq!(history.campaigns().unwrap().len(), 1);
     assert_eq!(history.cross_check(&id).unwrap(), None);

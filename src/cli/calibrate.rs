@@ -49,19 +49,19 @@ struct Label {
 struct Compared {
     property: String,
     found: Calibration,
-    /// The limit of its rule, if it has one: see [`Limit`].
-    limit: Option<Limit>,
+    /// The limit of its rule, if it has one: see [`RuleLimit`].
+    limit: Option<RuleLimit>,
 }
 
 /// The only number with which the `margin` rules of a property compare a value.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Limit {
+struct RuleLimit {
     value: f64,
     /// Whether the value must be below it.
     is_upper: bool,
 }
 
-impl Limit {
+impl RuleLimit {
     /// The limit with which the property passes from another margin on.
     fn moved(self, margin: f64) -> f64 {
         if self.is_upper {
@@ -229,7 +229,7 @@ fn compared(
 fn limits<'a>(
     args: &CalibrateArgs,
     properties: impl Iterator<Item = &'a String>,
-) -> BTreeMap<String, Limit> {
+) -> BTreeMap<String, RuleLimit> {
     let (files, path) = crate::why::ontology_file(args.ontology.as_deref());
     let Ok(ontology) = ontology::load(&files, &path) else {
         return BTreeMap::new();
@@ -242,8 +242,8 @@ fn limits<'a>(
 }
 
 /// Returns the limit in the `margin` rules of a rule file, if all have the same one.
-fn limit_of(source: &Source) -> Option<Limit> {
-    let mut found: Option<Limit> = None;
+fn limit_of(source: &Source) -> Option<RuleLimit> {
+    let mut found: Option<RuleLimit> = None;
     let margins = source
         .text
         .lines()
@@ -254,11 +254,11 @@ fn limit_of(source: &Source) -> Option<Limit> {
         let (left, right) = formula.split_once(" - ")?;
         let number = |text: &str| text.trim().parse::<f64>().ok();
         let own = match (number(left), number(right)) {
-            (Some(value), None) => Limit {
+            (Some(value), None) => RuleLimit {
                 value,
                 is_upper: true,
             },
-            (None, Some(value)) => Limit {
+            (None, Some(value)) => RuleLimit {
                 value,
                 is_upper: false,
             },
@@ -406,7 +406,7 @@ mod tests {
         let of = |text: &str| limit_of(&Source::new("rule.rls", text));
         assert_eq!(
             of("margin(?m) :- clearance(_, ?d), ?m = 0.05 - ?d ."),
-            Some(Limit {
+            Some(RuleLimit {
                 value: 0.05,
                 is_upper: true
             })
@@ -414,7 +414,7 @@ mod tests {
         let lower = "margin(?m) :- a(?d), ?m = ?d - 0.02 .\nmargin(?m) :- b(?d), ?m = ?d - 0.02 .";
         assert_eq!(
             of(lower),
-            Some(Limit {
+            Some(RuleLimit {
                 value: 0.02,
                 is_upper: false
             })
@@ -426,7 +426,7 @@ mod tests {
         ] {
             assert_eq!(of(without), None, "{without}");
         }
-        let moved = Limit {
+        let moved = RuleLimit {
             value: 0.05,
             is_upper: true,
         }

@@ -70,7 +70,7 @@ fn factor(text: &str) -> Result<f64, String> {
 
 /// A line of the player.
 #[derive(Debug, Deserialize)]
-struct Line {
+struct PlayerLine {
     #[serde(default)]
     engine_version: Option<String>,
     #[serde(default)]
@@ -270,7 +270,7 @@ fn play(args: &CrossCheckArgs, scratch: &Path) -> Result<Played, Diagnostics> {
     if let Some(stdout) = child.stdout.take() {
         for line in BufReader::new(stdout).lines() {
             let Ok(line) = line else { break };
-            let Ok(line) = serde_json::from_str::<Line>(&line) else {
+            let Ok(line) = serde_json::from_str::<PlayerLine>(&line) else {
                 continue;
             };
             played.add(line);
@@ -297,7 +297,7 @@ fn play(args: &CrossCheckArgs, scratch: &Path) -> Result<Played, Diagnostics> {
 }
 
 impl Played {
-    fn add(&mut self, line: Line) {
+    fn add(&mut self, line: PlayerLine) {
         if let Some(version) = line.engine_version {
             self.version = version;
             return;

@@ -4,9 +4,9 @@
 use std::fmt::Write as _;
 
 use crate::new_robot::numbers;
-use actcheck_config::quoted;
 use actcheck_base::{Diagnostic, Source};
 use actcheck_campaign::{FingerJoint, UnknownHand};
+use actcheck_config::quoted;
 
 /// Most joints that are listed.
 const MOST_JOINTS: usize = 60;
