@@ -1,7 +1,6 @@
 //! `actcheck cross-check`
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -17,7 +16,7 @@ use crate::convert::new_scratch;
 use crate::options::{Format, HistoryArgs};
 use crate::work::{all_cores, quietly};
 use crate::{clock, history_dir, output, trust};
-use actcheck_base::{Diagnostic, Diagnostics, names};
+use actcheck_base::{Below, Diagnostic, Diagnostics, names};
 use actcheck_campaign::{
     Env, EpisodeFile, ImportOptions, PlayableRun, RuleSet, RunContext, RunInBoth, decided, import,
     in_both, judge_played, mapping_of, on_workers, playable, rules_of,
@@ -201,6 +200,7 @@ fn chosen(history: &History, args: &CrossCheckArgs) -> Result<Vec<RunDetail>, Di
 
 /// Writes the files for the player, a folder for each run.
 fn write(runs: &[PlayableRun], folder: &Path) -> Result<(), Diagnostics> {
+    let below = Below::new(folder);
     for run in runs {
         let own = folder.join(&run.record.id);
         let actions: Vec<Value> = run
@@ -223,10 +223,15 @@ fn write(runs: &[PlayableRun], folder: &Path) -> Result<(), Diagnostics> {
             "fingers": run.fingers,
             "about": { "environment": format!("actcheck/{}", run.record.scene.world), "source_run": run.record.id },
         });
-        let written = fs::create_dir_all(&own)
-            .and_then(|()| fs::write(own.join("scene.xml"), &run.files.mjcf))
-            .and_then(|()| fs::write(own.join("setpoints.csv"), &run.files.setpoints))
-            .and_then(|()| fs::write(own.join("play.json"), told.to_string()));
+        let written = below
+            .create_folder(&own)
+            .and_then(|()| below.write_quickly(&own.join("scene.xml"), run.files.mjcf.as_bytes()))
+            .and_then(|()| {
+                below.write_quickly(&own.join("setpoints.csv"), run.files.setpoints.as_bytes())
+            })
+            .and_then(|()| {
+                below.write_quickly(&own.join("play.json"), told.to_string().as_bytes())
+            });
         written.map_err(|error| {
             Diagnostic::error("E008", format!("can't write {}: {error}", own.display()))
                 .help("free some space, or name another folder in TMPDIR")

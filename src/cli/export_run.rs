@@ -111,10 +111,10 @@ fn playable(
     };
     let played = quietly(|| campaign::playable(history, recalled, run, &context))?.files;
     let below = output_file::folder(folder)?;
-    let write = |name: &str, text: &str| {
+    let write = |name: &str, text: &str| -> Result<(), Diagnostics> {
         let file = folder.join(name);
         let written = below.write_atomic(&file, text.as_bytes());
-        written.map_err(|error| output_file::cannot_write(&file, error))
+        written.map_err(|error| output_file::cannot_write(&file, error).into())
     };
     write("scene.xml", &played.mjcf)?;
     let mut written = "scene.xml holds".to_owned();
