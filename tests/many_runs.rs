@@ -312,6 +312,7 @@ fn a_report_with_a_sample_filters_all_runs() {
         campaigns: &[],
         words: &Default::default(),
         replays: &Replays::default(),
+        contested: &Default::default(),
     });
     let file = folder.path().join("report.html");
     std::fs::write(&file, page).unwrap();

@@ -6,13 +6,15 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::{Value, json};
 
+use crate::margin_bounds::margin_bounds;
 use crate::options::{Format, HistoryArgs};
 use crate::{history_dir, output};
 use actcheck_analysis::{Calibration, FittedLimit, LabelledRun, calibrate as calibrate_labels};
-use actcheck_base::{Diagnostic, Diagnostics, Outcome, Source, did_you_mean, names};
+use actcheck_base::{Diagnostic, Diagnostics, Outcome, did_you_mean, names};
 use actcheck_history::{History, Judgements, RunFilter, Wish};
 use actcheck_ontology as ontology;
-use actcheck_report::Table;
+use actcheck_ontology::RuleLanguage;
+use actcheck_report::{MarginBound, Table};
 use actcheck_verdict::wilson;
 
 /// Maximum number of contradicting labels of a property in the text.
@@ -49,26 +51,16 @@ struct Label {
 struct Compared {
     property: String,
     found: Calibration,
-    /// The limit of its rule, if it has one: see [`RuleLimit`].
-    limit: Option<RuleLimit>,
+    /// The limit from which its rule measures its margin; `None` if there is none, or several.
+    limit: Option<MarginBound>,
 }
 
-/// The only number with which the `margin` rules of a property compare a value.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct RuleLimit {
-    value: f64,
-    /// Whether the value must be below it.
-    is_upper: bool,
-}
-
-impl RuleLimit {
-    /// The limit with which the property passes from another margin on.
-    fn moved(self, margin: f64) -> f64 {
-        if self.is_upper {
-            self.value - margin
-        } else {
-            self.value + margin
-        }
+/// The limit with which a property passes from another margin on.
+fn moved(limit: MarginBound, margin: f64) -> f64 {
+    if limit.below {
+        limit.at - margin
+    } else {
+        limit.at + margin
     }
 }
 
@@ -229,47 +221,21 @@ fn compared(
 fn limits<'a>(
     args: &CalibrateArgs,
     properties: impl Iterator<Item = &'a String>,
-) -> BTreeMap<String, RuleLimit> {
+) -> BTreeMap<String, MarginBound> {
     let (files, path) = crate::why::ontology_file(args.ontology.as_deref());
     let Ok(ontology) = ontology::load(&files, &path) else {
         return BTreeMap::new();
     };
     let of = |iri: &String| {
         let rule = &ontology.properties.get(iri)?.rule;
-        Some((iri.clone(), limit_of(&rule.source)?))
+        let bounds = match rule.language {
+            RuleLanguage::Datalog => margin_bounds(&rule.source),
+            _ => Vec::new(),
+        };
+        let [only] = bounds[..] else { return None };
+        Some((iri.clone(), only))
     };
     properties.filter_map(of).collect()
-}
-
-/// Returns the limit in the `margin` rules of a rule file, if all have the same one.
-fn limit_of(source: &Source) -> Option<RuleLimit> {
-    let mut found: Option<RuleLimit> = None;
-    let margins = source
-        .text
-        .lines()
-        .filter(|line| line.starts_with("margin("));
-    for line in margins {
-        let (_, formula) = line.rsplit_once("?m =")?;
-        let formula = formula.trim().trim_end_matches('.').trim();
-        let (left, right) = formula.split_once(" - ")?;
-        let number = |text: &str| text.trim().parse::<f64>().ok();
-        let own = match (number(left), number(right)) {
-            (Some(value), None) => RuleLimit {
-                value,
-                is_upper: true,
-            },
-            (None, Some(value)) => RuleLimit {
-                value,
-                is_upper: false,
-            },
-            _ => return None,
-        };
-        if found.is_some_and(|known| known != own) {
-            return None;
-        }
-        found = Some(own);
-    }
-    found
 }
 
 /// How a fitted limit differs from the present one, in words.
@@ -282,8 +248,8 @@ fn proposal(one: &Compared, fitted: &FittedLimit) -> String {
         Some(limit) => format!(
             "{}: the limit {:.4} fits the labels better than {}; {figures}",
             one.property,
-            limit.moved(fitted.margin),
-            limit.value
+            moved(limit, fitted.margin),
+            limit.at
         ),
         None => format!(
             "{}: the labels fit better if it passes from a margin of {:+.4} on; {figures}",
@@ -352,8 +318,8 @@ fn table(compared: &[Compared]) -> Table {
             json!(interval),
             json!(found.only_rules),
             json!(found.only_labels),
-            json!(one.limit.map(|limit| limit.value)),
-            json!(fitted.map(|(fitted, limit)| rounded(limit.moved(fitted.margin)))),
+            json!(one.limit.map(|limit| limit.at)),
+            json!(fitted.map(|(fitted, limit)| rounded(moved(limit, fitted.margin)))),
         ]);
     }
     table
@@ -369,7 +335,7 @@ fn json(compared: &[Compared]) -> Value {
         let fitted = one.found.fitted.map(|fitted| {
             json!({
                 "margin": fitted.margin,
-                "limit": one.limit.map(|limit| limit.moved(fitted.margin)),
+                "limit": one.limit.map(|limit| moved(limit, fitted.margin)),
                 "fitted_to": fitted.fitted_to,
                 "fitted": fitted.fitted,
                 "held_out": fitted.held_out,
@@ -389,48 +355,10 @@ fn json(compared: &[Compared]) -> Value {
             "agreeing": one.found.agreeing,
             "passes_only_by_rules": one.found.only_rules,
             "passes_only_by_labels": one.found.only_labels,
-            "limit": one.limit.map(|limit| limit.value),
+            "limit": one.limit.map(|limit| limit.at),
             "fitted": fitted,
             "contradicting": contradicting,
         })
     };
     json!(compared.iter().map(one).collect::<Vec<Value>>())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_limit_of_a_rule_is_found() {
-        let of = |text: &str| limit_of(&Source::new("rule.rls", text));
-        assert_eq!(
-            of("margin(?m) :- clearance(_, ?d), ?m = 0.05 - ?d ."),
-            Some(RuleLimit {
-                value: 0.05,
-                is_upper: true
-            })
-        );
-        let lower = "margin(?m) :- a(?d), ?m = ?d - 0.02 .\nmargin(?m) :- b(?d), ?m = ?d - 0.02 .";
-        assert_eq!(
-            of(lower),
-            Some(RuleLimit {
-                value: 0.02,
-                is_upper: false
-            })
-        );
-        for without in [
-            "",
-            "margin(?m) :- a(?d), ?m = ?d .",
-            "margin(?m) :- a(?d), ?m = ?d - 1 .\nmargin(?m) :- b(?d), ?m = 2 - ?d .",
-        ] {
-            assert_eq!(of(without), None, "{without}");
-        }
-        let moved = RuleLimit {
-            value: 0.05,
-            is_upper: true,
-        }
-        .moved(0.01);
-        assert!((moved - 0.04).abs() < 1e-12);
-    }
 }

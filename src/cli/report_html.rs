@@ -38,6 +38,7 @@ pub(super) fn page(found: &Analysed, history: &History, room: f64) -> Result<Str
         campaigns: &history.campaigns()?,
         words: &words(ontology),
         replays: &replays,
+        contested: &history.contested()?,
     }))
 }
 

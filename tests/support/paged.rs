@@ -86,5 +86,6 @@ pub fn page(
         campaigns: &[],
         words,
         replays,
+        contested: &BTreeMap::new(),
     })
 }

@@ -1,6 +1,6 @@
 //! Input of a page.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::FindingsSummary;
 use crate::html::{PackedRuns, Replays};
@@ -27,6 +27,9 @@ pub struct HtmlReport<'a> {
     pub words: &'a BTreeMap<String, PropertyWords>,
     /// Runs that can be played back.
     pub replays: &'a Replays,
+    /// Runs whose verdict another physics engine contests, each with the local names of the
+    /// properties that it decides otherwise.
+    pub contested: &'a BTreeMap<String, BTreeSet<String>>,
 }
 
 /// Names and descriptions of a property.

@@ -44,6 +44,12 @@ pub(super) fn summary(report: &HtmlReport<'_>, slots: &Slots) -> String {
         .campaigns
         .iter()
         .filter(|row| report.findings.campaigns.contains(&row.id));
+    let contested: BTreeMap<&String, _> = report
+        .contested
+        .iter()
+        .filter(|(run, _)| places.contains_key(run.as_str()))
+        .collect();
+    pack.set("contested", contested);
     pack.set("campaigns", shown.map(campaign).collect::<Vec<Value>>());
     pack.set(
         "slots",

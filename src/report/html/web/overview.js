@@ -18,6 +18,7 @@ function overview(report) {
       make("div", { class: "tiles" }, OUTCOMES.map(tile)),
       shares(counts, "Outcomes"),
       runs.sampled && make("p", {}, `Counts, rates, margins and failure modes are of all runs. Patterns, collisions, and the parameters and explanations of single runs are of a sample of ${counted(runs.detailed.length, "run")}.`),
+      Object.keys(summary.contested).length > 0 && make("p", {}, `${counted(Object.keys(summary.contested).length, "run")} ${Object.keys(summary.contested).length === 1 ? "is" : "are"} contested: MuJoCo, or one of its settings, decides a property otherwise (actcheck cross-check).`),
       scores.stopped && make("p", {}, "Outcomes ended a campaign (--max-failures, or an interrupt): shares of passes and failures are biased, and the intervals are wider, so that they are valid whenever one stops."),
       scores.bounds && make("p", {}, `${counted(scores.bounds.lost, "run")} ${scores.bounds.lost === 1 ? "was" : "were"} lost (broken or timed out), perhaps because they would have failed. Counted as failures, everything passed in ${percent(scores.bounds.as_failures.rate)}; counted as passes, in ${percent(scores.bounds.as_passes.rate)}.`),
       summary.campaigns.filter((row) => row.privileged).map((row) => make("p", {}, `In ${row.id} ${summary.privileged}.`))),

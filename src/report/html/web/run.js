@@ -17,6 +17,7 @@ function runView({ runs, summary, filter, address, to }, id) {
       make("h1", {}, id, " ", badge(worst, worst === "passed" ? "nothing failed" : worst)),
       make("nav", { "aria-label": "Other runs" }, step(-1, "← previous"), step(1, "next →"), make("a", { class: "button", href: address.of("runs") }, filter.isAny ? "all runs" : "these runs"))),
     make("p", { class: "lead" }, `${runs.text(runs.test, run)} · S = ${Number.isNaN(runs.score[run]) ? "–" : runs.score[run].toFixed(2)} · campaign ${runs.text(runs.campaign, run)} · ${moment(runs.told(runs.started, run))} · ${runs.text(runs.status, run)}`),
+    summary.contested[id] && make("p", { class: "note" }, `Contested: MuJoCo, or one of its settings, decides ${summary.contested[id].join(", ")} otherwise (actcheck cross-check).`),
     make("div", { class: "run" }, place, details),
     parameterTable(runs, run),
   ];
