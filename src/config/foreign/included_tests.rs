@@ -719,7 +719,7 @@ fn links_of_an_included_urdf_can_be_named() {
         let text = format!(
             "{tag}{}{}",
             include("tool", "<name>tool</name>"),
-            joint("fixed", ["tag", end], "").replace("_joint", "")
+            joint("fixed", ["tag", end], "").replace(&format!("{end}_joint"), "j")
         );
         let folder = Folder::new(&[("tool.urdf", urdf.clone()), ("a/model.sdf", model(&text))]);
         let (model, _) = folder.object("a/model.sdf").expect(end);
