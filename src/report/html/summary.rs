@@ -49,7 +49,7 @@ pub(super) fn summary(report: &HtmlReport<'_>, slots: &Slots) -> String {
         .iter()
         .filter(|(run, _)| places.contains_key(run.as_str()))
         .collect();
-    pack.set("contested", contested);
+    pack.set("contested", json!(contested));
     pack.set("campaigns", shown.map(campaign).collect::<Vec<Value>>());
     pack.set(
         "slots",
