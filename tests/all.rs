@@ -8,6 +8,7 @@ mod bounds;
 mod broken;
 mod browser;
 mod budgets;
+mod calibrate;
 mod campaign;
 mod case_candidates;
 mod cases;

@@ -66,9 +66,9 @@ fn moved(limit: MarginBound, margin: f64) -> f64 {
 
 /// Compares outcomes with people's labels, and prints how well they agree. Returns the exit code.
 pub fn calibrate(args: &CalibrateArgs) -> Result<u8, Diagnostics> {
-    let labels = read(&args.labels)?;
+    let (labels, faults) = read(&args.labels)?;
     let history = history_dir::open_to_read(&args.history)?;
-    let compared = compared(args, &history, labels)?;
+    let compared = compared(args, &history, labels, faults)?;
     output::print(&match args.format {
         Format::Text => output::page().set(&text(&compared)),
         Format::Csv => table(&compared).render(args.format.into(), output::page()),
@@ -80,8 +80,9 @@ pub fn calibrate(args: &CalibrateArgs) -> Result<u8, Diagnostics> {
     Ok(u8::from(!all_agree))
 }
 
-/// Reads the labels.
-fn read(path: &Path) -> Result<Vec<Label>, Diagnostics> {
+/// Reads the labels. Returns also the faults of lines, so that those of the history are reported
+/// with them.
+fn read(path: &Path) -> Result<(Vec<Label>, Diagnostics), Diagnostics> {
     let unreadable = |why: String| {
         Diagnostic::error(
             "X097",
@@ -144,7 +145,7 @@ fn read(path: &Path) -> Result<Vec<Label>, Diagnostics> {
     if labels.is_empty() && faults.is_empty() {
         faults.push(unreadable("it has no labels".to_owned()));
     }
-    faults.or(labels)
+    Ok((labels, faults))
 }
 
 /// Finds the outcome of each label.
@@ -152,6 +153,7 @@ fn compared(
     args: &CalibrateArgs,
     history: &History,
     labels: Vec<Label>,
+    mut faults: Diagnostics,
 ) -> Result<Vec<Compared>, Diagnostics> {
     // By run and property: whether it passed in all its actions, and its least margin.
     let mut known: BTreeMap<String, BTreeMap<String, (bool, Option<f64>)>> = BTreeMap::new();
@@ -175,7 +177,6 @@ fn compared(
             };
         }
     })?;
-    let mut faults = Diagnostics::new();
     let mut runs: BTreeMap<String, Vec<LabelledRun>> = BTreeMap::new();
     for label in labels {
         let place = format!("{}, line {}", args.labels.display(), label.line);
