@@ -5,7 +5,7 @@ use serde_json::Value;
 
 use crate::support::{actcheck, root, stderr, stdout};
 
-/// Makes picks in a folder. Returns what the program printed.
+/// Makes picks in a folder. Returns the program's output.
 fn picks(folder: &std::path::Path, more: &[&str]) -> std::process::Output {
     let config = root().join("configs/pick.toml");
     let mut arguments = vec!["run", config.to_str().unwrap(), "-q", "--history", "h"];
