@@ -106,12 +106,14 @@ pub fn judge_played(
     file: &Path,
     mapping: &Mapping,
     rules: &RuleSet,
+    here: &RunRecord,
 ) -> Result<RunRecord, Diagnostics> {
     let file = EpisodeFile {
         path: file.to_path_buf(),
         named: file.display().to_string(),
         mapping,
         rules,
+        repeats: Some(&here.trace),
     };
     run_of(&file, "", &Budget::default())
 }

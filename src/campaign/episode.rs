@@ -26,6 +26,8 @@ pub struct EpisodeFile<'m> {
     pub mapping: &'m Mapping,
     /// The rules that judge it.
     pub rules: &'m RuleSet,
+    /// The run that it repeats in another engine: its map and its percepts are also the episode's.
+    pub repeats: Option<&'m Trace>,
 }
 
 /// An episode as far as it is needed for its verdicts.
@@ -51,7 +53,10 @@ pub(crate) fn read(file: &EpisodeFile<'_>) -> Result<ReadEpisode, Diagnostics> {
     };
     let cast = file.mapping.cast(&episode).map_err(named)?;
     let actions = file.mapping.actions_of(&episode).map_err(named)?;
-    let trace = trace(&episode, &cast, &actions);
+    let mut trace = trace(&episode, &cast, &actions);
+    if let Some(run) = file.repeats {
+        repeat(&mut trace, run);
+    }
     check_actions(file, &trace)?;
     let said = episode
         .states
@@ -66,6 +71,29 @@ pub(crate) fn read(file: &EpisodeFile<'_>) -> Result<ReadEpisode, Diagnostics> {
         digest,
         counted,
     })
+}
+
+/// Facts about percepts, which no recording has.
+const OF_PERCEPTS: [&str; 7] = [
+    "ofObject",
+    "seenAs",
+    "takenAt",
+    "extentX",
+    "extentY",
+    "takenBaseX",
+    "cameraX",
+];
+
+/// Takes the map of the scene and the percepts of the actions from the run that an episode repeats.
+fn repeat(trace: &mut Trace, run: &Trace) {
+    trace.map = run.map.clone();
+    for (own, known) in trace.actions.iter_mut().zip(&run.actions) {
+        own.percepts.clone_from(&known.percepts);
+        own.perceived.clone_from(&known.perceived);
+    }
+    trace
+        .lacks
+        .retain(|fact| !OF_PERCEPTS.contains(&fact.as_str()));
 }
 
 /// Reads and judges an episode. Its place in a campaign is not known yet.

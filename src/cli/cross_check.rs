@@ -356,7 +356,8 @@ fn judged(
         })
         .collect();
     let records = on_workers(jobs, &all, |(number, _, path)| {
-        judge_played(path, &checked[*number].mapping, rules)
+        let run = &checked[*number];
+        judge_played(path, &run.mapping, rules, &run.here.record)
     })?;
     for ((number, setting, _), record) in all.into_iter().zip(records) {
         match record {
@@ -385,6 +386,7 @@ fn stored(
                 named: format!("{id} in MuJoCo {}", played.version),
                 mapping: &run.mapping,
                 rules,
+                repeats: Some(&run.here.record.trace),
             })
         })
         .collect();

@@ -225,6 +225,7 @@ impl Mappings {
                     named: episode.named.clone(),
                     mapping,
                     rules,
+                    repeats: None,
                 }),
                 Err(found) => faults.extend(found),
             }
