@@ -364,6 +364,11 @@ fn faults_are_reported_and_store_nothing() {
         "unknown.toml",
         format!("{mapping}\n[[actions]]\naction = \"Pik\"\npickObject = \"cub\"\n").as_bytes(),
     );
+    written(
+        "place.toml",
+        format!("{mapping}\n[[actions]]\naction = \"MoveTo\"\nobjectLocation = \"kitchen\"\n")
+            .as_bytes(),
+    );
     let (good, mapping) = (file("good-000001.mcap"), file("made.toml"));
     for (episode, mapping, codes) in [
         ("cut.mcap", mapping.as_str(), vec!["E002"]),
@@ -394,6 +399,7 @@ fn faults_are_reported_and_store_nothing() {
             "unknown.toml",
             vec!["E017", "did you mean `Pick`?", "E021", "`cube`"],
         ),
+        (&good, "place.toml", vec!["E021", "`kitchen`", "on no map"]),
     ] {
         let output = actcheck(
             folder.path(),
@@ -409,6 +415,33 @@ fn faults_are_reported_and_store_nothing() {
         }
         assert!(!folder.path().join("h").exists(), "{episode} {mapping}");
     }
+}
+
+/// No recording has percepts: whether a plane was perceived is not known, and so not failed.
+#[test]
+fn a_plane_that_no_recording_can_have_is_not_failed() {
+    let folder = tempfile::tempdir().unwrap();
+    let mapping = fs::read_to_string(data("made.toml")).unwrap();
+    let mapping = format!(
+        "{mapping}\n[[actions]]\naction = \"PerceivePlane\"\nfrom = \"start\"\nto = \"end\"\nobjectSurface = \"table\"\n"
+    );
+    fs::write(folder.path().join("plane.toml"), mapping).unwrap();
+    let episode = file("good-000001.mcap");
+    let output = actcheck(
+        folder.path(),
+        &[
+            "import",
+            &episode,
+            "--mapping",
+            "plane.toml",
+            "--history",
+            "h",
+        ],
+    );
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let (outcome, words) = &outcomes(folder.path())["good-000001.mcap"]["PlaneFound"];
+    assert_eq!(outcome, "inapplicable");
+    assert!(words.contains("`w:perceivedPlane`"), "{words}");
 }
 
 /// An import of episodes of several engines makes a campaign for each.

@@ -1,9 +1,11 @@
 //! `actcheck.Judge`: the same outcomes as `recheck`, in Rust and in Python.
 
+use std::fs::File;
+use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
 
 use actcheck::base::{Files, Judgement, names};
 use actcheck::campaign::{RuleSet, judge_stored};
@@ -34,7 +36,8 @@ const CONFIGS: [(&str, usize); 8] = [
 /// One performed action with the outcomes that `recheck` gives it.
 struct Judged {
     ontology: &'static str,
-    values: Value,
+    /// Shared by all ontologies: the course of an action takes megabytes.
+    values: Arc<Value>,
     outcomes: Vec<Judgement>,
 }
 
@@ -75,9 +78,10 @@ fn of_campaign(config: &str, runs: usize, wanted: usize) -> Vec<Judged> {
         .iter()
         .map(|row| history.traces().of(row, true).unwrap())
         .collect();
+    let values: Vec<Vec<Arc<Value>>> = traces.iter().map(values_of).collect();
     let judged: Vec<Judged> = ONTOLOGIES
         .iter()
-        .flat_map(|ontology| of_ontology(&history, &rows, &traces, ontology))
+        .flat_map(|ontology| of_ontology(&history, &rows, (&traces, &values), ontology))
         .collect();
     let outcomes: usize = judged.iter().map(|action| action.outcomes.len()).sum();
     eprintln!("{config}: {runs} runs, {outcomes} outcomes");
@@ -85,10 +89,26 @@ fn of_campaign(config: &str, runs: usize, wanted: usize) -> Vec<Judged> {
     judged
 }
 
+/// The values of each action of a run, for the judge.
+fn values_of(trace: &Trace) -> Vec<Arc<Value>> {
+    let steps = 0..trace.actions.len();
+    steps
+        .map(|step| {
+            // An action that was not performed has no states.
+            let is_performed = trace.actions[step].end.was_begun();
+            Arc::new(
+                is_performed
+                    .then(|| judge_values::action(trace, step))
+                    .into(),
+            )
+        })
+        .collect()
+}
+
 fn of_ontology(
     history: &History,
     rows: &[RunRow],
-    traces: &[Trace],
+    (traces, values): (&[Trace], &[Vec<Arc<Value>>]),
     ontology: &'static str,
 ) -> Vec<Judged> {
     let path = root().join("ontology").join(ontology);
@@ -97,9 +117,8 @@ fn of_ontology(
     let (rechecks, faults) = judge_stored(history, rows, &rules, 2, &stop).unwrap();
     assert!(faults.is_empty(), "{faults}");
     let mut judged = Vec::new();
-    for (row, trace) in rows.iter().zip(traces) {
+    for ((row, trace), values) in rows.iter().zip(traces).zip(values) {
         for (step, action) in trace.actions.iter().enumerate() {
-            // An action that was not performed has no states.
             if !action.end.was_begun() {
                 continue;
             }
@@ -108,7 +127,7 @@ fn of_ontology(
                 .filter(|it| it.run == row.run && it.step as usize == step + 1);
             judged.push(Judged {
                 ontology,
-                values: judge_values::action(trace, step),
+                values: Arc::clone(&values[step]),
                 outcomes: of_action.map(|it| it.now.clone()).collect(),
             });
         }
@@ -190,8 +209,9 @@ def plain(value):
 
 judges = {}
 for line in open(sys.argv[1]):
-    action = plain(json.loads(line))
-    judge = judges.get(action["ontology"]) or judges.setdefault(action["ontology"], actcheck.Judge(action["ontology"]))
+    ontology, action = json.loads(line)
+    action = plain(action)
+    judge = judges.get(ontology) or judges.setdefault(ontology, actcheck.Judge(ontology))
     verdict = judge(action["action"], action["before"], action["after"], action["during"], action["parameters"])
     print(json.dumps([[it.iri, it.outcome, it.margin, it.witness, it.held_before, it.vacuous, it.rule_digest]
                       for it in verdict.values()]))
@@ -202,15 +222,12 @@ fn judge_in_python_gives_every_outcome_that_recheck_gives() {
     let Some(package) = package() else { return };
     let folder = tempfile::tempdir().unwrap();
     let actions = folder.path().join("actions.jsonl");
-    let lines: Vec<String> = judged()
-        .iter()
-        .map(|action| {
-            let mut values = action.values.clone();
-            values["ontology"] = shipped(action.ontology).into();
-            values.to_string() + "\n"
-        })
-        .collect();
-    std::fs::write(&actions, lines.concat()).unwrap();
+    let mut lines = BufWriter::new(File::create(&actions).unwrap());
+    for action in judged() {
+        serde_json::to_writer(&mut lines, &(shipped(action.ontology), &*action.values)).unwrap();
+        lines.write_all(b"\n").unwrap();
+    }
+    lines.into_inner().unwrap();
     let output = Command::new(foreign::client_python())
         .args(["-c", SCRIPT])
         .arg(&actions)

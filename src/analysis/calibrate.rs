@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::{PairedTable, PairedTest};
+use crate::{Agreement, PairedTable, PairedTest};
 use actcheck_base::digest_of;
 
 /// A labelled verdict of a property in a run.
@@ -21,10 +21,8 @@ pub struct LabelledRun {
 /// The agreement of a property with labels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibration {
-    /// Number of labels.
-    pub labels: u64,
-    /// Number of labels with which the rules agree.
-    pub agreeing: u64,
+    /// How often the rules agree with the labels.
+    pub agreement: Agreement,
     /// Runs that pass by the rules and fail by their label.
     pub only_rules: u64,
     /// Runs that fail by the rules and pass by their label.
@@ -85,8 +83,10 @@ pub fn calibrate(runs: &[LabelledRun]) -> Calibration {
     };
     let (only_rules, only_labels) = (count([true, false]), count([false, true]));
     Calibration {
-        labels: runs.len() as u64,
-        agreeing: runs.len() as u64 - only_rules - only_labels,
+        agreement: Agreement {
+            agree: runs.len() as u64 - only_rules - only_labels,
+            of: runs.len() as u64,
+        },
         only_rules,
         only_labels,
         fitted,
@@ -233,9 +233,13 @@ mod tests {
         let found = calibrate(&runs);
         assert_eq!(found.fitted, None);
         assert_eq!(
-            (found.labels, found.agreeing, found.contradicting.len()),
-            (400, 380, 20)
+            found.agreement,
+            Agreement {
+                agree: 380,
+                of: 400
+            }
         );
+        assert_eq!(found.contradicting.len(), 20);
         assert_eq!(calibrate(&runs[..5]).fitted, None, "too few");
     }
 }

@@ -4,6 +4,7 @@
 //! Never: judges, changes a history (its tables are stored beside it), or exposes a type of the
 //! table library.
 
+mod agreement;
 mod answer;
 mod bisect;
 mod calibrate;
@@ -12,6 +13,7 @@ mod consistency;
 mod coverage;
 mod dataset;
 mod effects;
+mod engines;
 mod failure_modes;
 mod false_discovery;
 mod findings;
@@ -28,6 +30,7 @@ mod score_interval;
 mod stopped;
 mod tables;
 
+pub use agreement::Agreement;
 pub use answer::Answer;
 pub use bisect::{Likeness, OutcomeFlip, like_by_outcomes, like_by_rates, outcome_flips};
 pub use calibrate::{Calibration, FittedLimit, LabelledRun, calibrate};
@@ -42,6 +45,9 @@ pub use dataset::{Dataset, DatasetRuns, export_dataset, export_facts};
 pub use effects::{
     ActionEffects, FirstContact, LargestForce, PerceptionError, RealisedNoise, Surrounding,
     TableRun, perceived_sentences,
+};
+pub use engines::{
+    Disagreement, EngineComparison, OwnContact, Parting, PropertyAgreement, RunInEngines,
 };
 pub use failure_modes::{FailureMode, failure_modes};
 pub use false_discovery::benjamini_hochberg;

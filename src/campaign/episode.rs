@@ -5,15 +5,17 @@ use std::path::PathBuf;
 
 use crate::RuleSet;
 use actcheck_base::{Diagnostic, Diagnostics, Judgement, did_you_mean};
-use actcheck_data::{Role, Trace};
-use actcheck_episodes::{Episode, Mapping, trace};
+use actcheck_data::{ActionTrace, Role, Trace};
+use actcheck_episodes::{Episode, Mapping, repeat, trace};
 use actcheck_facts as facts;
 use actcheck_history::{EpisodeRecord, RunObject, RunRecord, RunScene, RunStatus};
 use actcheck_rules::Budget;
 use actcheck_verdict::{action_score, judge_action, run_score};
 
-/// Designators whose values are not things of the scene.
-const NOT_THINGS: [&str; 2] = ["objectLocation", "world"];
+/// The designator whose values are neither things nor places of the scene.
+const WORLD: &str = "world";
+/// The designator whose values are places on the map.
+const LOCATION: &str = "objectLocation";
 
 /// An episode file, with the mapping and the rules for it.
 #[derive(Clone)]
@@ -55,7 +57,7 @@ pub(crate) fn read(file: &EpisodeFile<'_>) -> Result<ReadEpisode, Diagnostics> {
     let actions = file.mapping.actions_of(&episode).map_err(named)?;
     let mut trace = trace(&episode, &cast, &actions);
     if let Some(run) = file.repeats {
-        repeat(&mut trace, run);
+        repeat(run, &mut trace);
     }
     check_actions(file, &trace)?;
     let said = episode
@@ -71,29 +73,6 @@ pub(crate) fn read(file: &EpisodeFile<'_>) -> Result<ReadEpisode, Diagnostics> {
         digest,
         counted,
     })
-}
-
-/// Facts about percepts, which no recording has.
-const OF_PERCEPTS: [&str; 7] = [
-    "ofObject",
-    "seenAs",
-    "takenAt",
-    "extentX",
-    "extentY",
-    "takenBaseX",
-    "cameraX",
-];
-
-/// Takes the map of the scene and the percepts of the actions from the run that an episode repeats.
-fn repeat(trace: &mut Trace, run: &Trace) {
-    trace.map = run.map.clone();
-    for (own, known) in trace.actions.iter_mut().zip(&run.actions) {
-        own.percepts.clone_from(&known.percepts);
-        own.perceived.clone_from(&known.perceived);
-    }
-    trace
-        .lacks
-        .retain(|fact| !OF_PERCEPTS.contains(&fact.as_str()));
 }
 
 /// Reads and judges an episode. Its place in a campaign is not known yet.
@@ -209,7 +188,11 @@ fn check_actions(file: &EpisodeFile<'_>, trace: &Trace) -> Result<(), Diagnostic
         .collect();
     for action in &trace.actions {
         for (designator, values) in &action.parameters {
-            if things.is_empty() || NOT_THINGS.contains(&designator.as_str()) {
+            if designator == LOCATION {
+                faults.extend(unknown_places(file, trace, action));
+                continue;
+            }
+            if things.is_empty() || designator == WORLD {
                 continue;
             }
             for value in values
@@ -250,6 +233,30 @@ fn check_actions(file: &EpisodeFile<'_>, trace: &Trace) -> Result<(), Diagnostic
         }
     }
     faults.or(())
+}
+
+/// E021: places that are not on the episode's map. Recordings have no map, and rules about places
+/// would fail without one.
+fn unknown_places(file: &EpisodeFile<'_>, trace: &Trace, action: &ActionTrace) -> Diagnostics {
+    let mut faults = Diagnostics::new();
+    let is_known = |place: &String| {
+        let mut locations = trace.map.locations.iter();
+        locations.any(|location| location.name == *place)
+    };
+    for place in action.parameters[LOCATION]
+        .iter()
+        .filter(|place| !is_known(place))
+    {
+        let message = format!(
+            "{}: the place `{place}` (`{LOCATION}` of `{}`) is on no map: recordings have none",
+            file.named, action.action
+        );
+        faults.push(
+            Diagnostic::error("E021", message)
+                .help("leave the action out, or judge where the robot arrives by an action and rules of your own"),
+        );
+    }
+    faults
 }
 
 /// The scene of an episode: its first state.

@@ -49,10 +49,7 @@ mod workers;
 pub use actcheck_world::{FingerJoint, Proposal, UnknownHand};
 pub use budget::ExhaustedBudget;
 pub use changes::{ChangeKind, InputChange, changes, made_by_other_physics, other_physics};
-pub use cross_check::{
-    JudgedProperty, OwnContact, Parting, RunInBoth, decided, in_both, judge_played, mapping_of,
-    rules_of,
-};
+pub use cross_check::{judge_played, mapping_of, rules_of};
 pub use difference::TraceDifference;
 pub use environment::Env;
 pub use episode::EpisodeFile;

@@ -4,21 +4,19 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use serde_json::{Value, json};
 
 use crate::margin_bounds::margin_bounds;
 use crate::options::{Format, HistoryArgs};
 use crate::{history_dir, output};
-use actcheck_analysis::{Calibration, FittedLimit, LabelledRun, calibrate as calibrate_labels};
+use actcheck_analysis::{LabelledRun, calibrate as calibrate_labels};
 use actcheck_base::{Diagnostic, Diagnostics, Outcome, did_you_mean, names};
 use actcheck_history::{History, Judgements, RunFilter, Wish};
 use actcheck_ontology as ontology;
 use actcheck_ontology::RuleLanguage;
-use actcheck_report::{MarginBound, Table};
-use actcheck_verdict::wilson;
+use actcheck_report::{
+    LabelSummary, LabelledProperty, MarginBound, labels_json, labels_table, labels_text,
+};
 
-/// Maximum number of contradicting labels of a property in the text.
-const MAX_LISTED: usize = 10;
 /// The columns of the file.
 const COLUMNS: [&str; 3] = ["run", "property", "label"];
 
@@ -47,37 +45,19 @@ struct Label {
     line: usize,
 }
 
-/// A property with its labels compared.
-struct Compared {
-    property: String,
-    found: Calibration,
-    /// The limit from which its rule measures its margin; `None` if there is none, or several.
-    limit: Option<MarginBound>,
-}
-
-/// The limit with which a property passes from another margin on.
-fn moved(limit: MarginBound, margin: f64) -> f64 {
-    if limit.below {
-        limit.at - margin
-    } else {
-        limit.at + margin
-    }
-}
-
 /// Compares outcomes with people's labels, and prints how well they agree. Returns the exit code.
 pub fn calibrate(args: &CalibrateArgs) -> Result<u8, Diagnostics> {
     let (labels, faults) = read(&args.labels)?;
     let history = history_dir::open_to_read(&args.history)?;
-    let compared = compared(args, &history, labels, faults)?;
+    let summary = LabelSummary {
+        properties: compared(args, &history, labels, faults)?,
+    };
     output::print(&match args.format {
-        Format::Text => output::page().set(&text(&compared)),
-        Format::Csv => table(&compared).render(args.format.into(), output::page()),
-        Format::Json => format!("{:#}\n", json(&compared)),
+        Format::Text => labels_text(&summary, output::page()),
+        Format::Csv => labels_table(&summary).render(args.format.into(), output::page()),
+        Format::Json => format!("{:#}\n", labels_json(&summary)),
     });
-    let all_agree = compared
-        .iter()
-        .all(|one| one.found.agreeing == one.found.labels);
-    Ok(u8::from(!all_agree))
+    Ok(summary.exit_code())
 }
 
 /// Reads the labels. Returns also the faults of lines, so that those of the history are reported
@@ -154,7 +134,7 @@ fn compared(
     history: &History,
     labels: Vec<Label>,
     mut faults: Diagnostics,
-) -> Result<Vec<Compared>, Diagnostics> {
+) -> Result<Vec<LabelledProperty>, Diagnostics> {
     // By run and property: whether it passed in all its actions, and its least margin.
     let mut known: BTreeMap<String, BTreeMap<String, (bool, Option<f64>)>> = BTreeMap::new();
     let wish = Wish {
@@ -209,7 +189,7 @@ fn compared(
     let limits = limits(args, runs.keys());
     Ok(runs
         .into_iter()
-        .map(|(iri, runs)| Compared {
+        .map(|(iri, runs)| LabelledProperty {
             found: calibrate_labels(&runs),
             limit: limits.get(&iri).copied(),
             property: names::local(&iri).to_owned(),
@@ -237,129 +217,4 @@ fn limits<'a>(
         Some((iri.clone(), only))
     };
     properties.filter_map(of).collect()
-}
-
-/// How a fitted limit differs from the present one, in words.
-fn proposal(one: &Compared, fitted: &FittedLimit) -> String {
-    let figures = format!(
-        "agreement with the {} labels that it was not fitted to: {} instead of {} (p = {:.4})",
-        fitted.held_out, fitted.confirmed[1], fitted.confirmed[0], fitted.test.second_worse
-    );
-    match one.limit {
-        Some(limit) => format!(
-            "{}: the limit {:.4} fits the labels better than {}; {figures}",
-            one.property,
-            moved(limit, fitted.margin),
-            limit.at
-        ),
-        None => format!(
-            "{}: the labels fit better if it passes from a margin of {:+.4} on; {figures}",
-            one.property, fitted.margin
-        ),
-    }
-}
-
-fn text(compared: &[Compared]) -> String {
-    let mut out = table(compared).render(Format::Text.into(), output::page());
-    for one in compared {
-        if let Some(fitted) = &one.found.fitted {
-            out += &format!("\n{}\n", proposal(one, fitted));
-        }
-        if one.found.contradicting.is_empty() {
-            continue;
-        }
-        out += &format!(
-            "\n{}: {} labels contradict the verdict; those of the surest verdicts first, which are the likeliest wrong labels\n",
-            one.property,
-            one.found.contradicting.len()
-        );
-        for run in one.found.contradicting.iter().take(MAX_LISTED) {
-            let margin = run
-                .margin
-                .map_or_else(String::new, |margin| format!(", margin {margin:+.4}"));
-            out += &format!("  {}: labelled {}{margin}\n", run.run, word(run.label));
-        }
-        let more = one.found.contradicting.len().saturating_sub(MAX_LISTED);
-        if more > 0 {
-            out += &format!("  and {more} more: `--format json` has all\n");
-        }
-    }
-    out
-}
-
-fn word(passes: bool) -> &'static str {
-    if passes { "pass" } else { "fail" }
-}
-
-fn table(compared: &[Compared]) -> Table {
-    let mut table = Table::new([
-        "property",
-        "labels",
-        "agree",
-        "interval",
-        "passes_only_by_rules",
-        "passes_only_by_labels",
-        "limit",
-        "fitted_limit",
-    ]);
-    for one in compared {
-        let found = &one.found;
-        let interval = wilson(found.agreeing, found.labels).map_or_else(String::new, |interval| {
-            format!(
-                "{:.0} to {:.0} %",
-                100.0 * interval.low,
-                100.0 * interval.high
-            )
-        });
-        let fitted = found.fitted.as_ref().zip(one.limit);
-        table.rows.push(vec![
-            json!(one.property),
-            json!(found.labels),
-            json!(found.agreeing),
-            json!(interval),
-            json!(found.only_rules),
-            json!(found.only_labels),
-            json!(one.limit.map(|limit| limit.at)),
-            json!(fitted.map(|(fitted, limit)| rounded(moved(limit, fitted.margin)))),
-        ]);
-    }
-    table
-}
-
-/// A limit in four decimals, as texts have it.
-fn rounded(value: f64) -> f64 {
-    (value * 1e4).round() / 1e4
-}
-
-fn json(compared: &[Compared]) -> Value {
-    let one = |one: &Compared| {
-        let fitted = one.found.fitted.map(|fitted| {
-            json!({
-                "margin": fitted.margin,
-                "limit": one.limit.map(|limit| moved(limit, fitted.margin)),
-                "fitted_to": fitted.fitted_to,
-                "fitted": fitted.fitted,
-                "held_out": fitted.held_out,
-                "confirmed": fitted.confirmed,
-                "p": fitted.test.second_worse,
-            })
-        });
-        let contradicting: Vec<Value> = one
-            .found
-            .contradicting
-            .iter()
-            .map(|run| json!({ "run": run.run, "label": word(run.label), "margin": run.margin }))
-            .collect();
-        json!({
-            "property": one.property,
-            "labels": one.found.labels,
-            "agreeing": one.found.agreeing,
-            "passes_only_by_rules": one.found.only_rules,
-            "passes_only_by_labels": one.found.only_labels,
-            "limit": one.limit.map(|limit| limit.at),
-            "fitted": fitted,
-            "contradicting": contradicting,
-        })
-    };
-    json!(compared.iter().map(one).collect::<Vec<Value>>())
 }

@@ -191,7 +191,7 @@ impl Side {
     /// Reads a side by its name on the command line.
     ///
     /// # Errors
-    /// There is no such campaign, or the history can't be read.
+    /// The history can't be read, or does not have the campaign.
     pub(super) fn read(
         text: &str,
         default: &HistoryArgs,

@@ -2,20 +2,16 @@
 //! user's choice.
 
 use std::ffi::OsStr;
-use std::fs;
-use std::io::{BufRead as _, BufReader, Read as _};
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 
 use serde::Deserialize;
 
+use crate::python::{PythonModule, new_scratch};
 use actcheck_base::{Diagnostic, Diagnostics, ScratchFolder, open_regular};
 
-/// The Python package, whose module `actcheck.episodes` converts episodes.
-#[derive(rust_embed::RustEmbed)]
-#[folder = "shipped/python/"]
-#[include = "*.py"]
-struct PythonPackage;
+/// The packages that a converter needs.
+const NEEDS: &str = "h5py and the recording's MuJoCo";
 
 /// Episode files, and the faults of files that could not be converted.
 #[derive(Default)]
@@ -117,28 +113,6 @@ fn is_ours(path: &Path) -> bool {
     is_mcap && start.windows(8).any(|window| window == b"actcheck")
 }
 
-/// Writes the Python package into a folder.
-fn unpack(folder: &Path) -> Result<(), Diagnostics> {
-    for name in PythonPackage::iter() {
-        let Some(file) = PythonPackage::get(&name) else {
-            continue;
-        };
-        let target = folder.join("python").join(&*name);
-        let written = target
-            .parent()
-            .map_or(Ok(()), fs::create_dir_all)
-            .and_then(|()| fs::write(&target, &file.data));
-        if written.is_err() {
-            return Err(
-                Diagnostic::error("E008", format!("can't write {}", target.display()))
-                    .help("free some space, or name another folder in TMPDIR")
-                    .into(),
-            );
-        }
-    }
-    Ok(())
-}
-
 /// Makes and records the faulty episodes of a suite such as `libero_spatial` or `robosuite/Stack`.
 ///
 /// # Errors
@@ -156,16 +130,6 @@ pub fn faulty_episodes(suite: &str, python: &Path) -> Result<Converted, Diagnost
     run(&arguments, suite, scratch.path(), python, &mut converted)?;
     converted._scratch = Some(scratch);
     Ok(converted)
-}
-
-/// Creates a temporary folder with the Python package.
-pub(super) fn new_scratch() -> Result<ScratchFolder, Diagnostics> {
-    let scratch = ScratchFolder::create().map_err(|error| {
-        Diagnostic::error("E008", format!("can't create a temporary folder: {error}"))
-            .help("name another folder in TMPDIR")
-    })?;
-    unpack(scratch.path())?;
-    Ok(scratch)
 }
 
 /// Converts one file.
@@ -204,73 +168,43 @@ fn run(
     python: &Path,
     converted: &mut Converted,
 ) -> Result<(), Diagnostics> {
-    let mut command = Command::new(python);
-    command
-        .args(["-m", "actcheck.episodes"])
-        .args(arguments)
-        .env("PYTHONPATH", scratch.join("python"))
-        .env("PYTHONDONTWRITEBYTECODE", "1")
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    let not_started = |error: std::io::Error| {
-        Diagnostic::error(
-            "E008",
-            format!("can't start `{}`: {error}", python.display()),
-        )
-        .help("name a Python with h5py and the recording's MuJoCo: `--python venv/bin/python`")
+    let module = PythonModule {
+        python,
+        name: "actcheck.episodes",
+        needs: NEEDS,
+        scratch,
     };
-    let mut child = command.spawn().map_err(not_started)?;
-    let stderr = child.stderr.take();
-    // Read beside the output, so that a converter with much to say can't block.
-    let errors = std::thread::spawn(move || {
-        let mut text = String::new();
-        if let Some(stderr) = stderr {
-            let _ = stderr.take(1 << 16).read_to_string(&mut text);
-        }
-        text
-    });
     let mut any = false;
-    if let Some(stdout) = child.stdout.take() {
-        for line in BufReader::new(stdout).lines() {
-            let Ok(line) = line else { break };
-            let Ok(line) = serde_json::from_str::<Line>(&line) else {
-                continue;
-            };
-            any = true;
-            let named = match &line.episode {
-                Some(key) if !key.is_empty() => format!("{}:{key}", line.file),
-                _ => line.file.clone(),
-            };
-            if let Some(path) = line.written {
-                converted.episodes.push(ConvertedEpisode { path, named });
-            } else if let Some(reason) = line.left_out {
-                let sentence = format!("{named} is left out: {reason}");
-                converted.left_out.push(sentence);
-            } else {
-                let reason = line.reason.unwrap_or("it can't be converted".to_owned());
-                let fault = Diagnostic::error("E009", format!("{named}: {reason}"));
-                converted.faults.push(fault);
-            }
-        }
-    }
-    let status = child.wait().map_err(not_started)?;
-    let errors = errors.join().unwrap_or_default();
-    // The converter ends with 0, or with 1 if it printed a fault.
-    let is_crashed = !matches!(status.code(), Some(0 | 1));
-    if !any || is_crashed {
+    let end = module.run(arguments, |line: Line| {
+        any = true;
+        converted.add(line);
+    })?;
+    if !any || end.is_crash() {
         let what = if any {
             format!("some episodes of {shown} are missing")
         } else {
             format!("{shown} can't be converted")
         };
-        let last = errors.lines().last().unwrap_or("it printed nothing");
-        converted.faults.push(
-            Diagnostic::error("E009", format!("{what}: {last}")).help(format!(
-                "the converter `{} -m actcheck.episodes` ended with {status}",
-                python.display()
-            )),
-        );
+        converted.faults.push(module.crash(&end, &what));
     }
     Ok(())
+}
+
+impl Converted {
+    /// Adds the episode, or the fault, of a line.
+    fn add(&mut self, line: Line) {
+        let named = match &line.episode {
+            Some(key) if !key.is_empty() => format!("{}:{key}", line.file),
+            _ => line.file.clone(),
+        };
+        if let Some(path) = line.written {
+            self.episodes.push(ConvertedEpisode { path, named });
+        } else if let Some(reason) = line.left_out {
+            self.left_out.push(format!("{named} is left out: {reason}"));
+        } else {
+            let reason = line.reason.unwrap_or("it can't be converted".to_owned());
+            let fault = Diagnostic::error("E009", format!("{named}: {reason}"));
+            self.faults.push(fault);
+        }
+    }
 }

@@ -31,7 +31,7 @@ impl Gate {
     /// Opens the baseline of the arguments; `None` if they name none.
     ///
     /// # Errors
-    /// There is no such campaign, or its scenes are others.
+    /// The history does not have the baseline, or the baseline has another seed and so other scenes.
     pub(super) fn open(
         args: &RunArgs,
         env: &Env,

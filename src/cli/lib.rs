@@ -57,6 +57,7 @@ mod output_file;
 mod own_files;
 mod picture;
 mod progress;
+mod python;
 mod query;
 mod query_endpoint;
 mod recheck;

@@ -176,14 +176,18 @@ impl Quantity {
         ),
     ];
 
-    /// Facts that no episode has: the engine's sleep, restitution, the robot's belief, and its
-    /// perception.
-    const NEVER: [&'static str; 12] = [
+    /// Facts that no episode has: the engine's sleep, restitution, and the robot's belief.
+    const NEVER: [&'static str; 5] = [
         "asleep",
         "restitution",
         "believedX",
         "believedY",
         "believedYaw",
+    ];
+
+    /// Facts about the robot's percepts, and the plane that it perceives. No recording has them; an
+    /// episode that repeats a run has those of the run.
+    pub(crate) const OF_PERCEPTS: [&'static str; 8] = [
         "ofObject",
         "seenAs",
         "takenAt",
@@ -191,6 +195,7 @@ impl Quantity {
         "extentY",
         "takenBaseX",
         "cameraX",
+        "perceivedPlane",
     ];
 
     /// Returns the quantity with this name in a file, or `None`.
@@ -232,7 +237,11 @@ impl Lacks {
             .iter()
             .filter(|(quantity, ..)| self.has(*quantity))
             .flat_map(|(.., facts)| facts.iter());
-        let names: BTreeSet<&str> = of_quantities.chain(&Quantity::NEVER).copied().collect();
+        let names: BTreeSet<&str> = of_quantities
+            .chain(&Quantity::NEVER)
+            .chain(&Quantity::OF_PERCEPTS)
+            .copied()
+            .collect();
         names.into_iter().map(str::to_owned).collect()
     }
 }

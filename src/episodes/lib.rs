@@ -32,4 +32,4 @@ pub use episode::{
 pub use lacks::{Lacks, Quantity};
 pub use mapping::{Action, Mapping, Moment};
 pub use propose::propose;
-pub use trace::trace;
+pub use trace::{repeat, trace};

@@ -61,6 +61,19 @@ pub fn trace(episode: &Episode, cast: &Cast, actions: &[Action]) -> Trace {
     trace
 }
 
+/// Gives the trace of an episode what it has from the run that it repeats in another engine: the map
+/// of the scene, and the percepts of the actions.
+pub fn repeat(run: &Trace, trace: &mut Trace) {
+    trace.map = run.map.clone();
+    for (own, known) in trace.actions.iter_mut().zip(&run.actions) {
+        own.percepts.clone_from(&known.percepts);
+        own.perceived.clone_from(&known.perceived);
+    }
+    trace
+        .lacks
+        .retain(|fact| !Quantity::OF_PERCEPTS.contains(&fact.as_str()));
+}
+
 /// An action whose values are ids of things where they were names of bodies.
 fn with_ids(action: &Action, watched: &Watched<'_>) -> Action {
     let mut action = action.clone();

@@ -132,8 +132,8 @@ const CODES_E: &[Code] = &[
     ),
     code(
         "E021",
-        "a designator names no object of the episode",
-        "the mapping gives the object another id, or the recorder marked another name",
+        "a designator names no object of the episode, or a place although recordings have no map",
+        "the mapping gives the object another id, the recorder marked another name, or the action needs a map",
         "take the suggested id, or the name of the object's body",
     ),
     code(

@@ -6,8 +6,10 @@
 mod campaign;
 mod case;
 mod compare;
+mod engines;
 mod findings;
 mod health;
+mod labels;
 mod oracles;
 mod recheck;
 mod remarks;
@@ -23,9 +25,12 @@ pub use campaign::{
 pub use case::CaseSummary;
 pub use compare::{CompareSummary, ComparedSide, SideChange};
 pub(crate) use compare::{compared_name, compared_parts};
+pub use engines::EngineSummary;
 pub(crate) use findings::percent;
 pub use findings::{Causes, FindingsSummary, PropertyReport};
 pub use health::HealthSummary;
+pub(crate) use labels::label_word;
+pub use labels::{LabelSummary, LabelledProperty};
 pub use oracles::OracleSummary;
 pub(crate) use oracles::notice_word;
 pub(crate) use recheck::reason_text;

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actcheck.faults import RecordingFault
+from actcheck.lines import print_lines
 from actcheck.recording import record
 
 #: Number of steps of friction that the setting `noslip` adds to each step.
@@ -28,7 +29,6 @@ _NOSLIP = 5
 #: Factor on the friction of the fingers in the setting `finger-friction`.
 _GRIP = 1.1
 _PYRAMIDAL = 0
-_FREE, _SLIDE = 0, 2
 
 
 @dataclass(frozen=True)
@@ -214,12 +214,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m actcheck.cross_check", description="Plays runs of actcheck in MuJoCo, open loop.")
     parser.add_argument("folder", type=Path, help="a folder with a folder for each run")
     parser.add_argument("--finger-friction", type=float, default=1.0, metavar="FACTOR", help="makes the friction of the fingers wrong")
-    parsed = parser.parse_args(arguments)
-    faults = 0
-    for line in _lines(parsed):
-        faults += "reason" in line
-        print(json.dumps(line), flush=True)
-    return 1 if faults else 0
+    return print_lines(_lines(parser.parse_args(arguments)))
 
 
 def _lines(parsed: argparse.Namespace) -> Iterator[dict[str, Any]]:

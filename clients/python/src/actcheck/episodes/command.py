@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import re
 import sys
 from collections.abc import Iterator
@@ -15,17 +14,13 @@ from actcheck.episodes.faults import EpisodeFault
 from actcheck.episodes.faulty import FAULTS
 from actcheck.episodes.sources import Episode, Options, Source
 from actcheck.faults import RecordingFault
+from actcheck.lines import print_lines
 from actcheck.recording.file import slug
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Runs the command. Returns 0 if every episode was written or left out, 1 if one has a fault, 2 if the arguments are wrong."""
-    parsed = _parser().parse_args(arguments)
-    faults = 0
-    for line in _lines(parsed):
-        faults += "reason" in line
-        print(json.dumps(line), flush=True)
-    return 1 if faults else 0
+    return print_lines(_lines(_parser().parse_args(arguments)))
 
 
 def _lines(parsed: argparse.Namespace) -> Iterator[dict[str, Any]]:
