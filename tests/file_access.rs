@@ -25,7 +25,7 @@ const FORBIDDEN: [&str; 15] = [
 ];
 
 /// Sources that may use some of them, with the reason.
-const EXCEPTIONS: [(&str, &str); 11] = [
+const EXCEPTIONS: [(&str, &str); 10] = [
     ("base/below.rs", "creates the folder that the user named"),
     (
         "base/write_atomic.rs",
@@ -40,10 +40,6 @@ const EXCEPTIONS: [(&str, &str); 11] = [
     (
         "cli/bisect/scenes.rs",
         "removes a history in a scratch folder",
-    ),
-    (
-        "cli/convert.rs",
-        "writes the Python package into a scratch folder",
     ),
     (
         "protocol/process.rs",

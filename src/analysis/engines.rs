@@ -100,7 +100,7 @@ impl RunInEngines {
         let flips = |one: &RunRecord, other: &RunRecord| -> BTreeSet<String> {
             let differing = decided(one, other).into_iter();
             let differing = differing.filter(|(_, [one, other])| one != other);
-            let name = |((_, property), _): (JudgedProperty, _)| names::local(&property).to_owned();
+            let name = |((_, property), _): (StepProperty, _)| names::local(&property).to_owned();
             differing.map(name).collect()
         };
         let both = decided(here, exported);
@@ -231,10 +231,10 @@ impl EngineComparison {
 }
 
 /// A property of an action of a run: number of the action, from 0, and IRI.
-type JudgedProperty = (usize, String);
+type StepProperty = (usize, String);
 
 /// The explanation of an outcome.
-fn witness(record: &RunRecord, (step, property): &JudgedProperty) -> String {
+fn witness(record: &RunRecord, (step, property): &StepProperty) -> String {
     let judgements = record.judgements.get(*step).into_iter().flatten();
     let mut own = judgements.filter(|judgement| judgement.property == *property);
     own.next()
@@ -242,7 +242,7 @@ fn witness(record: &RunRecord, (step, property): &JudgedProperty) -> String {
 }
 
 /// Returns the outcomes that both records decide.
-fn decided(here: &RunRecord, there: &RunRecord) -> BTreeMap<JudgedProperty, [bool; 2]> {
+fn decided(here: &RunRecord, there: &RunRecord) -> BTreeMap<StepProperty, [bool; 2]> {
     let passed = |outcome: Outcome| match outcome {
         Outcome::Passed => Some(true),
         Outcome::Failed => Some(false),

@@ -1,8 +1,8 @@
 //! Judges the recordings of runs that another physics engine played.
 
 use std::path::Path;
-use std::sync::Arc;
 
+use crate::Env;
 use crate::episode::{EpisodeFile, run_of};
 use crate::playable::PlayableRun;
 use crate::rule_set::RuleSet;
@@ -67,11 +67,11 @@ pub fn judge_played(
     run_of(&file, "", &Budget::default())
 }
 
-/// The rules of a campaign, shared by the judgements of its recordings.
+/// Prepares the present rules of a campaign.
 ///
 /// # Errors
 /// The ontology or a rule has faults.
-pub fn rules_of(env: &crate::Env) -> Result<Arc<RuleSet>, Diagnostics> {
+pub fn rules_of(env: &Env) -> Result<RuleSet, Diagnostics> {
     let (files, path) = &env.campaign.ontology;
-    Ok(Arc::new(RuleSet::prepare(files, path)?))
+    RuleSet::prepare(files, path)
 }

@@ -40,6 +40,7 @@ mod scene_facts;
 mod schedule;
 mod search_space;
 mod searching;
+mod setpoints;
 pub mod shrink;
 mod solids;
 mod starts;

@@ -1,4 +1,4 @@
-//! A run as a model in MJCF, as MuJoCo loads it, and its setpoints as a table.
+//! A run as a model in MJCF, as MuJoCo loads it.
 //!
 //! The model is in the state of the run's first frame as it is loaded: joints have their position
 //! there as `ref`. Masses, inertias and shapes are those that were simulated. The actuators have
@@ -7,16 +7,12 @@
 //! mean of both in pairs of fingers or furniture with objects, which are listed, and the larger of
 //! both elsewhere.
 
-use std::fmt::Write as _;
-
 use nalgebra::{Isometry3, Vector3};
 use quick_xml::Writer;
 use quick_xml::events::{BytesEnd, BytesStart, BytesText, Event};
 
 use actcheck_data::{Part, Pose, Scene, SceneObject, Shape};
-use actcheck_world::{
-    GRAVITY, Joint, JointKind, Playback, PlayedObject, Robot, Setpoint, has_volume,
-};
+use actcheck_world::{GRAVITY, Joint, JointKind, Playback, PlayedObject, Robot, has_volume};
 
 /// Steps of MuJoCo in a control tick. With half as many, things slip out of a hand that drives: its
 /// contacts creep by an amount that depends on the step.
@@ -81,43 +77,6 @@ pub(super) fn write(run: &str, robot: &Robot, scene: &Scene, playback: &Playback
     bodies.actuators(&mut out);
     out.close("mujoco");
     out.finish()
-}
-
-/// Returns the setpoints as CSV: for each control tick its end since the start and, for each joint,
-/// position, velocity, largest effort, and the commanded effort if there is one instead.
-pub(super) fn setpoints(robot: &Robot, playback: &Playback) -> String {
-    let mut out = String::from("time_secs");
-    for joint in &robot.model.joints {
-        for column in ["position", "velocity", "limit", "effort"] {
-            _ = write!(out, ",{}", csv_name(&format!("{}.{column}", joint.name)));
-        }
-    }
-    out.push('\n');
-    for (tick, setpoints) in playback.ticks.iter().enumerate() {
-        _ = write!(out, "{}", (tick + 1) as f64 * playback.tick_secs);
-        for Setpoint {
-            position,
-            velocity,
-            limit,
-            effort,
-        } in setpoints
-        {
-            _ = write!(out, ",{position},{velocity},{limit},");
-            if let Some(effort) = effort {
-                _ = write!(out, "{effort}");
-            }
-        }
-        out.push('\n');
-    }
-    out
-}
-
-fn csv_name(name: &str) -> String {
-    if name.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", name.replace('"', "\"\""))
-    } else {
-        name.to_owned()
-    }
 }
 
 /// The bodies of a run.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use crate::attempt::Attempt;
 use crate::finished_run::RunPlace;
 use crate::replay::{cut_secs, refused};
-use crate::{RunContext, StoredCampaign, mjcf};
+use crate::{RunContext, StoredCampaign, mjcf, setpoints};
 use actcheck_actions::Cut;
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_data::{ActionEnd, CONTROL_HZ, Choices, Trace};
@@ -101,7 +101,7 @@ pub fn playable(
     Ok(PlayableRun {
         files: Playable {
             mjcf: mjcf::write(&detail.row.run, &env.robot, &run.scene, &playback),
-            setpoints: mjcf::setpoints(&env.robot, &playback),
+            setpoints: setpoints::write(&env.robot, &playback),
         },
         actions: played_actions(&run.trace),
         fingers: env

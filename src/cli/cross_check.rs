@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use clap::Args;
@@ -307,7 +306,7 @@ impl Played {
 fn judged(
     runs: Vec<PlayableRun>,
     played: &Played,
-    rules: &Arc<RuleSet>,
+    rules: &RuleSet,
     (jobs, campaign): (usize, &str),
     faults: &mut Diagnostics,
 ) -> Result<Vec<Checked>, Diagnostics> {

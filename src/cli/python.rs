@@ -2,14 +2,13 @@
 //! this program does not.
 
 use std::ffi::OsStr;
-use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::path::Path;
 use std::process::{Command, ExitStatus, Stdio};
 
 use serde::de::DeserializeOwned;
 
-use actcheck_base::{Diagnostic, Diagnostics, ScratchFolder};
+use actcheck_base::{Below, Diagnostic, Diagnostics, ScratchFolder};
 
 /// The package. Its modules print one JSON object in each line.
 #[derive(rust_embed::RustEmbed)]
@@ -128,6 +127,7 @@ pub(super) fn new_scratch() -> Result<ScratchFolder, Diagnostics> {
 
 /// Writes the package into a folder.
 fn unpack(folder: &Path) -> Result<(), Diagnostics> {
+    let below = Below::new(folder);
     for name in PythonPackage::iter() {
         let Some(file) = PythonPackage::get(&name) else {
             continue;
@@ -135,15 +135,13 @@ fn unpack(folder: &Path) -> Result<(), Diagnostics> {
         let target = folder.join("python").join(&*name);
         let written = target
             .parent()
-            .map_or(Ok(()), fs::create_dir_all)
-            .and_then(|()| fs::write(&target, &file.data));
-        if written.is_err() {
-            return Err(
-                Diagnostic::error("E008", format!("can't write {}", target.display()))
-                    .help("free some space, or name another folder in TMPDIR")
-                    .into(),
-            );
-        }
+            .map_or(Ok(()), |parent| below.create_folder(parent))
+            .and_then(|()| below.write_quickly(&target, &file.data));
+        written.map_err(|error| {
+            let message = format!("can't write {}: {error}", target.display());
+            Diagnostic::error("E008", message)
+                .help("free some space, or name another folder in TMPDIR")
+        })?;
     }
     Ok(())
 }

@@ -61,8 +61,8 @@ pub fn trace(episode: &Episode, cast: &Cast, actions: &[Action]) -> Trace {
     trace
 }
 
-/// Gives the trace of an episode what it has from the run that it repeats in another engine: the map
-/// of the scene, and the percepts of the actions.
+/// Gives the trace of an episode that repeats a run in another engine the map and the percepts of
+/// that run.
 pub fn repeat(run: &Trace, trace: &mut Trace) {
     trace.map = run.map.clone();
     for (own, known) in trace.actions.iter_mut().zip(&run.actions) {

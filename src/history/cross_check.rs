@@ -31,7 +31,7 @@ impl History {
     /// Stores the cross-check of a campaign. It replaces an earlier one.
     ///
     /// # Errors
-    /// `H001` if it can't be written.
+    /// `H006` if it can't be written.
     pub fn store_cross_check(&self, check: &CrossCheck) -> Result<(), Diagnostics> {
         let below = Below::new(self.dir());
         let file = self.cross_check_file(&check.campaign);
@@ -40,7 +40,7 @@ impl History {
             .create_folder(&self.dir().join(FOLDER))
             .and_then(|()| below.write_atomic(&file, text.as_bytes()));
         written.map_err(|error| {
-            Diagnostic::error("H001", format!("can't write {}: {error}", file.display()))
+            Diagnostic::error("H006", format!("can't write {}: {error}", file.display()))
                 .help("free some space, or make the folder writable")
                 .into()
         })
@@ -49,7 +49,7 @@ impl History {
     /// Returns the cross-check of a campaign, or `None` if there is none.
     ///
     /// # Errors
-    /// `H002` if its file is damaged.
+    /// `H007` if its file is damaged.
     pub fn cross_check(&self, campaign: &str) -> Result<Option<CrossCheck>, Diagnostics> {
         let below = Below::new(self.dir());
         let file = self.cross_check_file(campaign);
@@ -57,7 +57,7 @@ impl History {
             return Ok(None);
         }
         let damaged = |why: String| {
-            Diagnostic::error("H002", format!("{} can't be read: {why}", file.display()))
+            Diagnostic::error("H007", format!("{} can't be read: {why}", file.display()))
                 .help("remove it, and give `actcheck cross-check` again")
         };
         let text = below
@@ -71,7 +71,7 @@ impl History {
     /// that another engine, or one of its settings, decides otherwise.
     ///
     /// # Errors
-    /// `H002` if a file is damaged.
+    /// `H007` if a file is damaged.
     pub fn contested(&self) -> Result<BTreeMap<String, BTreeSet<String>>, Diagnostics> {
         let below = Below::new(self.dir());
         let folder = self.dir().join(FOLDER);
@@ -91,5 +91,38 @@ impl History {
 
     fn cross_check_file(&self, campaign: &str) -> PathBuf {
         self.dir().join(FOLDER).join(format!("{campaign}.json"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_damaged_file_is_named_and_another_campaign_has_none() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let history = History::open(&folder.path().join("h")).expect("it is new");
+        let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+        let check = CrossCheck {
+            campaign: "k7f3".to_owned(),
+            engine: "MuJoCo 4.0.0".to_owned(),
+            imported: None,
+            runs: [
+                ("k7f3-1".to_owned(), names(&["Held"])),
+                ("k7f3-2".to_owned(), names(&[])),
+            ]
+            .into(),
+        };
+        history.store_cross_check(&check).expect("it is written");
+        assert_eq!(
+            history.cross_check("k7f3").expect("it is there"),
+            Some(check)
+        );
+        assert_eq!(history.cross_check("other").expect("none is needed"), None);
+        let contested = history.contested().expect("it is there");
+        assert_eq!(contested.keys().collect::<Vec<_>>(), ["k7f3-1"]);
+        std::fs::write(history.cross_check_file("k7f3"), "{").expect("it is writable");
+        let faults = history.contested().expect_err("it is cut off").to_string();
+        assert!(faults.contains("k7f3.json"), "{faults}");
     }
 }

@@ -2,8 +2,6 @@
 //! motors with their setpoints in each control tick, the masses that are simulated, and the links
 //! that collide.
 
-use nalgebra::Vector3;
-
 use rapier3d::prelude::RigidBodyHandle;
 
 use crate::bodies::Bodies;
@@ -84,14 +82,8 @@ pub struct Setpoint {
 /// An object as it is simulated at the start.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlayedObject {
-    /// Id in the scene.
-    pub id: String,
-    /// Pose of the model's origin. Frame: world.
+    /// Pose of the model's origin. Frame: world. It is at rest.
     pub pose: Pose,
-    /// Velocity of its origin. Unit: m/s. Frame: world.
-    pub linear_velocity: [f64; 3],
-    /// Unit: rad/s. Frame: world.
-    pub angular_velocity: [f64; 3],
     /// Its masses; `None` if it can't move.
     pub inertia: Option<PrincipalInertia>,
     /// Position of the joint that moves it, if it is a part of another object. Units: metres or
@@ -182,10 +174,6 @@ fn friction_of(bodies: &Bodies, link: RigidBodyHandle) -> f64 {
 fn played(bodies: &Bodies, object: &Object) -> PlayedObject {
     let body = bodies.physics.bodies.get(object.body);
     let moving = body.filter(|body| !body.is_fixed());
-    let velocities = moving.map_or([Vector3::zeros(); 2], |body| {
-        let linear = body.velocity_at_point(body.translation());
-        [from_vector(linear), from_vector(body.angvel())]
-    });
     let inertia = moving.map(|body| {
         let properties = &body.mass_properties().local_mprops;
         let turn = properties.principal_inertia_local_frame.to_array();
@@ -199,10 +187,7 @@ fn played(bodies: &Bodies, object: &Object) -> PlayedObject {
         }
     });
     PlayedObject {
-        id: object.id.clone(),
         pose: Pose::from_isometry(&bodies.pose_of(object)),
-        linear_velocity: velocities[0].into(),
-        angular_velocity: velocities[1].into(),
         inertia,
         joint_position: bodies.part_position(object),
     }
