@@ -14,7 +14,7 @@ use actcheck::history::{History, RunFilter, RunRow};
 use actcheck_judge::{Call, Judge};
 use serde_json::{Value, json};
 
-use crate::support::{actcheck, foreign, judge_values, project, root, stderr, stdout};
+use crate::support::{actcheck, copy, foreign, judge_values, project, root, stderr, stdout};
 
 /// Number of outcomes to compare. Without it, small campaigns are compared.
 const OUTCOMES: &str = "ACTCHECK_JUDGE_OUTCOMES";
@@ -177,14 +177,7 @@ pub fn package() -> Option<&'static Path> {
             return Err("`make judge` was not run".to_owned());
         }
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("package_with_judge");
-        let package = folder.join("actcheck");
-        std::fs::create_dir_all(&package).map_err(|error| error.to_string())?;
-        for file in std::fs::read_dir(&sources).unwrap() {
-            let file = file.unwrap();
-            if file.file_type().unwrap().is_file() {
-                std::fs::copy(file.path(), package.join(file.file_name())).unwrap();
-            }
-        }
+        copy(&sources, &folder.join("actcheck"));
         Ok(folder)
     });
     let package = package.as_ref();

@@ -8,7 +8,7 @@ use crate::replay::{cut_secs, refused};
 use crate::{RunContext, StoredCampaign, mjcf, setpoints};
 use actcheck_actions::Cut;
 use actcheck_base::{Diagnostic, Diagnostics};
-use actcheck_data::{ActionEnd, CONTROL_HZ, Choices, Trace};
+use actcheck_data::{CONTROL_HZ, Choices, Trace};
 use actcheck_history::{History, RunDetail, RunRecord};
 
 /// A run that another engine can play.
@@ -46,7 +46,7 @@ pub struct PlayableRun {
     pub fingers: [Vec<String>; 2],
     /// Name of the body of the robot's base.
     pub base: String,
-    /// The run here, judged by the present rules.
+    /// The run here, judged by the present rules; with the performed actions only.
     pub record: RunRecord,
 }
 
@@ -111,8 +111,25 @@ pub fn playable(
             .each_ref()
             .map(|finger| finger.iter().map(name).collect()),
         base: name(&base),
-        record: run.into_record(RunPlace::alone(&record.id)),
+        record: performed_only(run.into_record(RunPlace::alone(&record.id))),
     })
+}
+
+/// Leaves out the actions that were not performed: another engine does not play them, and both
+/// records are compared action by action.
+fn performed_only(mut record: RunRecord) -> RunRecord {
+    let actions = record.trace.actions.iter();
+    let kept: Vec<bool> = actions.map(|action| action.end.was_begun()).collect();
+    fn keep<T>(list: &mut Vec<T>, kept: &[bool]) {
+        let mut kept = kept.iter();
+        list.retain(|_| *kept.next().unwrap_or(&true));
+    }
+    keep(&mut record.trace.actions, &kept);
+    keep(&mut record.trace.robot_courses, &kept);
+    keep(&mut record.judgements, &kept);
+    keep(&mut record.actions, &kept);
+    keep(&mut record.action_scores, &kept);
+    record
 }
 
 /// The actions that were performed, with their control ticks.
@@ -120,10 +137,7 @@ fn played_actions(trace: &Trace) -> Vec<PlayedAction> {
     let mut began = 0;
     let mut actions = Vec::new();
     for (action, end) in trace.actions.iter().zip(trace.snapshots.iter().skip(1)) {
-        if matches!(
-            action.end,
-            ActionEnd::NotReached | ActionEnd::NotPerformed(_)
-        ) {
+        if !action.end.was_begun() {
             continue;
         }
         #[expect(

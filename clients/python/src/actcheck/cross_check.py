@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from actcheck.faults import RecordingFault
 from actcheck.lines import print_lines
-from actcheck.recording import record
+from actcheck.recording import Recorder, record
 
 #: Number of steps of friction that the setting `noslip` adds to each step.
 _NOSLIP = 5
@@ -125,20 +125,9 @@ def play(run: Run, change: Callable[[Any, Run], None], to: Path) -> float:
     with record(model, data, to) as recorder:
         recorder.about |= run.about
         recorder.step()
-        begins = {action["begin_tick"]: action for action in reversed(run.actions)}
-        ends = {action["end_tick"]: action for action in run.actions}
         grips = _Grips(mujoco, model, run.fingers)
         for tick in range(len(run.position) + 1):
-            if tick in ends and tick > ends[tick]["begin_tick"]:
-                action = ends[tick]
-                reported = action["reported"]
-                message = action["message"]
-                if reported and action["holds"] and not grips.hold():
-                    reported, message = False, "the fingers hold nothing"
-                recorder.mark(action["action"], "end", reported=reported, message=message)
-            if tick in begins and tick < len(run.position):
-                action = begins[tick]
-                recorder.mark(action["action"], "begin", **action["parameters"])
+            _mark(recorder, run, tick, grips)
             if tick == len(run.position):
                 break
             for step in range(steps):
@@ -147,6 +136,26 @@ def play(run: Run, change: Callable[[Any, Run], None], to: Path) -> float:
             grips.look(data)
             recorder.step()
     return time.process_time() - began
+
+
+def _mark(recorder: Recorder, run: Run, tick: int, grips: _Grips) -> None:
+    """Records the actions that end or begin at a tick; an action that fails at once does both."""
+    for action in run.actions:
+        if action["begin_tick"] < tick == action["end_tick"]:
+            _mark_end(recorder, action, grips)
+    for action in run.actions:
+        if action["begin_tick"] == tick:
+            recorder.mark(action["action"], "begin", **action["parameters"])
+            if action["end_tick"] == tick:
+                _mark_end(recorder, action, grips)
+
+
+def _mark_end(recorder: Recorder, action: dict[str, Any], grips: _Grips) -> None:
+    """Records the end of an action with the robot's own report. It is no success if the robot held an object here, and holds none there."""
+    reported, message = action["reported"], action["message"]
+    if reported and action["holds"] and not grips.hold():
+        reported, message = False, "the fingers hold nothing"
+    recorder.mark(action["action"], "end", reported=reported, message=message)
 
 
 class _Motors:
