@@ -11,7 +11,6 @@ use std::rc::Rc;
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
-use crate::foreign::geom_mass::{GeomMass, MeshMasses};
 use crate::foreign::lookup::{Lookup, beside};
 use crate::foreign::mjcf_budget::Budget;
 use crate::foreign::mjcf_compiler::{
@@ -20,6 +19,7 @@ use crate::foreign::mjcf_compiler::{
 use crate::foreign::mjcf_couplings::Couplings;
 use crate::foreign::mjcf_elements;
 use crate::foreign::mjcf_masks::{Contacts, Mask, collides};
+use crate::foreign::solid_mass::{MeshMasses, SolidMass};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostic, Diagnostics, Source, SourceSpan};
 use actcheck_data::{
@@ -823,7 +823,7 @@ impl Model<'_> {
                     reader.found.push(fault.help(help));
                 }
             }
-            let GeomMass { kg, com, about_com } = masses.together(heavy, &meshes);
+            let SolidMass { kg, com, about_com } = masses.together(heavy, &meshes);
             if kg > 0.0 || rules.masses.least[0] > 0.0 {
                 let inertial = TreeInertial {
                     pose: Isometry3::translation(com.x, com.y, com.z),

@@ -4,12 +4,12 @@ use std::rc::Rc;
 
 use nalgebra::{Isometry3, Point3};
 
-use crate::foreign::geom_mass::equivalent_box;
 use crate::foreign::geometry::Shapes;
 use crate::foreign::hull::convex_hull;
 use crate::foreign::mjcf::Model;
 use crate::foreign::mjcf_compiler::{Compiler, Item, MeshAsset, MjcfAttributes};
 use crate::foreign::mjcf_masks::{Mask, collides};
+use crate::foreign::solid_mass::equivalent_box;
 use crate::foreign::xml::{Bound, LONGEST, Node, Reader};
 use actcheck_data::{Amount, Matter, Mesh, Shape, Spread, TreeGeometry, TreeSolid};
 

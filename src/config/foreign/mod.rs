@@ -38,8 +38,6 @@ mod nested;
 pub(crate) mod robot;
 pub(crate) mod robot_inertia;
 pub(crate) mod robot_shapes;
-
-mod geom_mass;
 mod sdf;
 mod sdf_ends;
 mod sdf_inertial;
@@ -55,7 +53,7 @@ mod sdf_robot_model;
 mod sdf_robot_tests;
 mod sdf_robot_tree;
 mod sdf_surface;
-mod solids;
+mod solid_mass;
 #[cfg(test)]
 mod stated_tests;
 mod tree_checks;
