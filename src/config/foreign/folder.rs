@@ -13,7 +13,7 @@ use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::{Lookup, beside, spellings};
 use crate::foreign::nested::{SubModel, Tree};
 use crate::foreign::xml::{self, Node, Reader};
-use crate::foreign::{mjcf, sdf, tree_object, urdf};
+use crate::foreign::{mjcf, root_name, sdf, tree_object, urdf};
 use actcheck_base::{
     Diagnostic, Diagnostics, FileFault, Files, Severity, Source, did_you_mean, xml_text,
 };
@@ -395,33 +395,17 @@ fn model_file(files: &Files, folder: &Path) -> Option<PathBuf> {
         .find(|path| inside.contains(path))
 }
 
-/// Whether a file is MJCF: XML whose root is `<mujoco>`. A URDF may have such an element, too, but
-/// not as its root.
+/// Whether a file is MJCF: XML whose root is `<mujoco>`, or `<mujocoinclude>`. A URDF may have such an
+/// element, too, but not as its root.
 fn is_mjcf(files: &Files, path: &Path) -> bool {
     let is_xml = path.extension().is_some_and(|ending| ending == "xml");
+    let begins = |text: &str| root_name(text).is_some_and(|root| root.starts_with("mujoco"));
     is_xml
         && files.read_bytes(path).is_ok_and(|bytes| {
             // A file with faults in its encoding is MJCF, too; its reader reports them.
-            begins_with_mujoco(&String::from_utf8_lossy(&bytes))
-                || xml_text(bytes).is_ok_and(|text| begins_with_mujoco(&text))
+            begins(&String::from_utf8_lossy(&bytes))
+                || xml_text(bytes).is_ok_and(|text| begins(&text))
         })
-}
-
-/// Whether the first element of a text is `<mujoco>`.
-fn begins_with_mujoco(text: &str) -> bool {
-    let mut rest = text;
-    while let Some(at) = rest.find('<') {
-        rest = &rest[at..];
-        let end = if rest.starts_with("<!--") {
-            "-->"
-        } else if rest.starts_with("<?") || rest.starts_with("<!") {
-            ">"
-        } else {
-            return rest.starts_with("<mujoco");
-        };
-        rest = rest.split_once(end).map_or("", |(_, after)| after);
-    }
-    false
 }
 
 fn unreadable(path: &Path, reason: &FileFault) -> Diagnostic {

@@ -218,18 +218,8 @@ impl Compiler {
             limits_itself: true,
             fits_boxes: false,
         };
-        if root.tag_name().name() != "mujoco" {
-            let message = format!(
-                "the root is `<{}>` instead of `<mujoco>`",
-                root.tag_name().name()
-            );
-            reader.error(
-                "W032",
-                root,
-                message,
-                "an MJCF file begins with `<mujoco model=\"…\">`",
-            );
-        }
+        let help = "an MJCF file begins with `<mujoco model=\"…\">`";
+        reader.root(root, "mujoco", help);
         let mut folders = Folders::default();
         for settings in xml::children(root, "compiler") {
             compiler.read_settings(settings, &mut folders, reader);

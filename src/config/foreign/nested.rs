@@ -23,7 +23,7 @@ use actcheck_base::Span;
 use actcheck_data::PartJoint;
 
 /// Of the elements that are read, `allow_auto_disable`, `name` and `origin` have no effect.
-const MODEL: Children = Children {
+pub(super) const MODEL: Children = Children {
     read: &[
         "link",
         "joint",

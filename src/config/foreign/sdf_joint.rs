@@ -14,17 +14,20 @@ const UNLIMITED: f64 = 1e6;
 const OWN_FRAME: u32 = 5;
 
 pub(crate) const JOINT: Children = Children {
-    read: &["parent", "child", "pose", "axis", "axis2", "origin"],
-    // The limits and damping in `<physics>` are those of other solvers, with their own defaults.
+    read: &["parent", "child", "pose", "axis", "origin"],
+    // The limits and damping in `<physics>` are those of other solvers, with their own defaults;
+    // a second axis, gears and screws belong to types of joints that are errors.
     harmless: &[
         "sensor",
         "physics",
+        "axis2",
         "gearbox_ratio",
         "gearbox_reference_body",
         "thread_pitch",
         "screw_thread_pitch",
     ],
-    refused: &[],
+    // It belongs into `<axis>`.
+    refused: &["mimic"],
 };
 const AXIS: Children = Children {
     read: &[
@@ -47,7 +50,7 @@ const DYNAMICS: Children = Children {
     harmless: &[],
     refused: &[],
 };
-/// There is no motor whose effort and speed could have limits.
+/// The motors of robots have the limits `effort` and `velocity`; the joints of objects have no motors.
 const LIMIT: Children = Children {
     read: &[
         "lower",

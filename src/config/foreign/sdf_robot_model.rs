@@ -4,9 +4,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::Isometry3;
 
-use crate::foreign::elements::Children;
 use crate::foreign::inclusions::check_size;
-use crate::foreign::nested::{refuse_static, warn_of_plugin};
+use crate::foreign::nested::{MODEL, refuse_static, warn_of_plugin};
 use crate::foreign::sdf::is_static;
 use crate::foreign::sdf_ends::{JointEnd, WrittenPart};
 use crate::foreign::sdf_pose::{self, pose};
@@ -15,29 +14,6 @@ use crate::foreign::xml::{self, Bound, Node, Reader};
 use crate::foreign::{sdf_robot_joint, sdf_robot_link};
 use actcheck_base::{Diagnostic, Diagnostics, did_you_mean};
 use actcheck_data::{Mesh, TreeJoint, TreeLink, TreeMimic, TreeMotion};
-
-/// Of the elements that are read, `allow_auto_disable`, `name` and `origin` have no effect.
-const MODEL: Children = Children {
-    read: &[
-        "link",
-        "joint",
-        "static",
-        "pose",
-        "frame",
-        "self_collide",
-        "allow_auto_disable",
-        "enable_wind",
-        "plugin",
-        "model",
-        "include",
-        "name",
-        "origin",
-        "placement_frame",
-    ],
-    // Grippers hold by friction here.
-    harmless: &["gripper"],
-    refused: &[],
-};
 
 /// Longest name of a link with those of the models around it: all pairs of links may be listed.
 const LONGEST_NAME: usize = 500;
@@ -266,6 +242,10 @@ impl<'a> RobotElements<'a> {
                     self.couplings.push(written(child));
                 }
                 "plugin" => warn_of_plugin(child, reader),
+                "gripper" => {
+                    let message = "`<gripper>` in `<model>` is ignored".to_owned();
+                    reader.warning("W036", child, message, "grippers hold by friction here");
+                }
                 _ => {}
             }
         }
