@@ -242,11 +242,11 @@ pub(crate) fn included<'a>(
 ) -> Option<SubModel> {
     file.inclusions.check_room(uri, reader)?;
     let name = name_in(xml::text(uri));
-    let Some(found) = meant(xml::text(uri), file.path, file.lookup) else {
+    let Some(found) = named_by(xml::text(uri), file.path, file.lookup) else {
         let message = format!("the model `{name}` is missing");
         let known: Vec<&str> = known.collect();
         let help = match known.is_empty() {
-            true => "put its folder beside the others".to_owned(),
+            true => "put its folder beside those of the other models".to_owned(),
             false => did_you_mean(&name, known),
         };
         reader.error("W040", uri, message, help);
@@ -286,7 +286,7 @@ pub(crate) struct ModelText {
     pub(crate) source: Source,
 }
 
-/// Returns the text of the model that a URI in a file means; `None` if there is no such model.
+/// Returns the text of the model that a URI in a file names; `None` if the model is missing.
 ///
 /// # Errors
 /// Its file is unreadable (W030), or its `model.config` names none (W033).
@@ -295,16 +295,16 @@ pub(crate) fn text_of(
     file: &Path,
     lookup: &Lookup,
 ) -> Result<Option<ModelText>, Diagnostics> {
-    let Some(found) = meant(uri, file, lookup) else {
+    let Some(found) = named_by(uri, file, lookup) else {
         return Ok(None);
     };
     let Opened { path, text, .. } = Opened::of(&found, lookup)?;
     Ok(Some(ModelText { path, source: text }))
 }
 
-/// Finds the model that a URI in a file means. One without a scheme is first relative to the file,
+/// Finds the model that a URI in a file names. One without a scheme is first relative to the file,
 /// and then a path in the folders of models.
-fn meant(uri: &str, file: &Path, lookup: &Lookup) -> Option<Found> {
+fn named_by(uri: &str, file: &Path, lookup: &Lookup) -> Option<Found> {
     let by_name = || named(&name_in(uri), lookup);
     match is_path(uri) {
         true => at_path(uri, file, lookup).or_else(by_name),

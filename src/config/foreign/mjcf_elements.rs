@@ -145,7 +145,7 @@ fn check_equalities(root: Node, purpose: Purpose, reader: &mut Reader) {
     }
 }
 
-/// Reports another gravity than that of the simulation: a world with it would be another one.
+/// Reports gravity that differs from that of the simulation: in a world, it is an error (W035).
 fn check_options(root: Node, purpose: Purpose, reader: &mut Reader) {
     for option in xml::children(root, "option") {
         let mut differs =

@@ -184,7 +184,7 @@ impl<'a> Model<'a> {
     fn asset(&self, name: &str, geom: Node, reader: &mut Reader) -> Option<Rc<MeshAsset>> {
         let found = self.compiler.meshes.get(name).cloned();
         if found.is_none() {
-            let message = format!("there is no mesh `{name}` in `<asset>`");
+            let message = format!("`<asset>` has no mesh `{name}`");
             let help = "add `<mesh name=\"…\" file=\"…\"/>` to `<asset>`";
             reader.error("W035", geom, message, help);
         }

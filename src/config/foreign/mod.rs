@@ -29,6 +29,7 @@ mod mjcf_compiler;
 mod mjcf_couplings;
 mod mjcf_elements;
 mod mjcf_geoms;
+mod mjcf_graft;
 mod mjcf_loops;
 mod mjcf_masks;
 #[cfg(test)]
@@ -56,6 +57,8 @@ mod sdf_surface;
 mod solid_mass;
 #[cfg(test)]
 mod stated_tests;
+#[cfg(test)]
+mod test_files;
 mod tree_checks;
 mod tree_object;
 mod urdf;

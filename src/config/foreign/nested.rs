@@ -381,6 +381,7 @@ impl Tree {
         }
         let others = match n_links {
             1 => String::new(),
+            2 => " and the link joined to it".to_owned(),
             _ => format!(" and the {} links joined to it", n_links - 1),
         };
         let message = format!("no joint connects `{name}`{others} to the other links");

@@ -7,7 +7,7 @@ use crate::foreign::sdf_pose::{frame, pose};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_data::PartJoint;
 
-/// Limits beyond this are none. Units: metres or radians.
+/// Larger limits mean that the joint is unlimited. Units: metres or radians.
 const UNLIMITED: f64 = 1e6;
 /// The minor version of SDF 1 from which axes are in the frame of their joint, no longer in that of
 /// the model.
@@ -168,7 +168,7 @@ pub(crate) fn motion(
     })
 }
 
-/// Reads a limit: `Some(None)` if there is none, `None` after a fault.
+/// Reads a limit: `Some(None)` if the joint has none, `None` after a fault.
 #[expect(clippy::option_option, reason = "a fault and a missing limit differ")]
 pub(super) fn limit(limits: Option<Node>, name: &str, reader: &mut Reader) -> Option<Option<f64>> {
     let Some(node) = limits.and_then(|limits| xml::child(limits, name)) else {

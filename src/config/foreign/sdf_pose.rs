@@ -49,8 +49,8 @@ pub(crate) fn place(model: Node, reader: &mut Reader) -> Option<Included> {
     })
 }
 
-/// Returns a frame of the model that contains an element, in the frame of that model. Reports W035,
-/// and returns `None`, if there is no such frame.
+/// Returns a frame of the model that contains an element, in the frame of that model. If the
+/// model lacks the frame, reports W035 and returns `None`.
 pub(crate) fn frame(node: Node, name: &str, reader: &mut Reader) -> Option<Isometry3<f64>> {
     named(scope(node), name, node, 0, reader)
 }
@@ -94,7 +94,7 @@ fn frames(model: Node, reader: &mut Reader) -> BTreeMap<String, Frame> {
 }
 
 /// Returns the name of the link that carries a frame of the model that contains an element; `None`
-/// if there is no such frame. Nothing is reported.
+/// if the model lacks the frame, which is not reported.
 pub(crate) fn carrier(node: Node, name: &str, reader: &Reader) -> Option<String> {
     link_of(scope(node), name, 0, reader)
 }
@@ -306,7 +306,8 @@ fn named(
         .filter_map(|child| name_of(child, reader))
         .collect();
     let help = did_you_mean(name, known.iter().map(String::as_str));
-    reader.error("W035", at, format!("there is no frame `{name}`"), help);
+    let message = format!("the {} has no frame `{name}`", model.tag_name().name());
+    reader.error("W035", at, message, help);
     None
 }
 

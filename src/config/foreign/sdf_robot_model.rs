@@ -25,7 +25,7 @@ pub(crate) struct LinkAt {
     pub(crate) at: Isometry3<f64>,
     /// The beginning of the names in its own model.
     pub(crate) model: String,
-    /// Whether its file says that it collides with others of its model.
+    /// Whether its file says that it collides with the other links of its model.
     pub(crate) collides: Option<bool>,
     /// Faults of shapes that are only seen.
     pub(crate) faults_of_visuals: Option<Diagnostics>,
@@ -117,7 +117,8 @@ impl Group {
         }
     }
 
-    /// Adds the pairs of colliding links of one model of which at least one collides with no other.
+    /// Adds the pairs of links of one model that pass through each other, because one of the two has
+    /// `<self_collide>` of false.
     /// Reports names that are too long (W055).
     fn add_passing(&mut self, reader: &mut Reader) {
         let longest = self.links.iter().max_by_key(|link| link.link.name.len());
@@ -392,7 +393,7 @@ fn couple(plugin: &WrittenPart, group: &mut Group, reader: &mut Reader) {
         None => {
             let known = group.joints.iter().map(|joint| joint.joint.name.as_str());
             let help = did_you_mean(&follower, known);
-            let message = format!("there is no joint `{follower}` to follow `{leader}`");
+            let message = format!("the model has no joint `{follower}` to follow `{leader}`");
             reader.error("W051", node, message, help);
         }
     }

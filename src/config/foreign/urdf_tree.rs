@@ -15,7 +15,7 @@ use actcheck_data::{
 /// Supported joint types.
 const TYPES: [&str; 4] = ["fixed", "prismatic", "revolute", "continuous"];
 
-/// Elements of a joint of which there is one.
+/// Elements that a joint may have once.
 const SINGLE: [&str; 8] = [
     "origin",
     "parent",
@@ -148,7 +148,12 @@ fn read_passing(root: Node, tree: &mut ModelTree, reader: &mut Reader) {
         for name in [first, second] {
             if tree.link(name).is_none() {
                 let help = did_you_mean(name, tree.links.iter().map(|link| link.name.as_str()));
-                reader.error("W051", pair, format!("there is no link `{name}`"), help);
+                reader.error(
+                    "W051",
+                    pair,
+                    format!("the model has no link `{name}`"),
+                    help,
+                );
             }
         }
         tree.passing.push([first.to_owned(), second.to_owned()]);
@@ -488,7 +493,7 @@ fn end<'n>(
     let link = reader.attribute(end, "link")?;
     if !links.contains(link) {
         let help = did_you_mean(link, links.iter().copied());
-        reader.error("W051", end, format!("there is no link `{link}`"), help);
+        reader.error("W051", end, format!("the model has no link `{link}`"), help);
         return None;
     }
     Some(link)
