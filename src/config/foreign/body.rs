@@ -6,6 +6,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector3};
 
 use crate::foreign::frames::Frame;
+use crate::foreign::solid_mass::SolidMass;
 use actcheck_base::names;
 use actcheck_data::{
     Inertia, MovingPart, ObjectModel, Part, PartJoint, Pose, Shape, Surface, bounds,
@@ -159,28 +160,21 @@ impl Body {
         self.parts.iter().map(moved).collect()
     }
 
-    /// Combines the links' inertia tensors about the common centre of mass, by the parallel axis
-    /// theorem.
+    /// Combines the links' inertia tensors about the common centre of mass; `None` if one of them
+    /// must be computed from the shapes.
     fn inertia(&self, model_from_file: &Isometry3<f64>) -> Option<Inertia> {
-        let total: f64 = self.masses.iter().map(|mass| mass.kg).sum();
-        let com = self
-            .masses
-            .iter()
-            .map(|mass| mass.com * mass.kg)
-            .sum::<Vector3<f64>>()
-            / total;
-        let mut sum = Matrix3::zeros();
-        for mass in &self.masses {
-            let arm = mass.com - com;
-            sum += mass.about_com?
-                + (Matrix3::identity() * arm.norm_squared() - arm * arm.transpose()) * mass.kg;
-        }
-        let turn = model_from_file.rotation.to_rotation_matrix();
-        let sum = turn.matrix() * sum * turn.matrix().transpose();
-        let com = (model_from_file * Point3::from(com)).coords;
+        let masses = self.masses.iter().map(|mass| {
+            Some(SolidMass {
+                kg: mass.kg,
+                com: mass.com,
+                about_com: mass.about_com?,
+            })
+        });
+        let masses = masses.collect::<Option<Vec<SolidMass>>>()?;
+        let SolidMass { com, about_com, .. } = SolidMass::together(&masses).moved(model_from_file);
         Some(Inertia {
             com_m: com.into(),
-            about_com: [0, 1, 2].map(|row| [sum[(row, 0)], sum[(row, 1)], sum[(row, 2)]]),
+            about_com: [0, 1, 2].map(|row| [0, 1, 2].map(|column| about_com[(row, column)])),
         })
     }
 }

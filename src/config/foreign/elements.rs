@@ -1,8 +1,11 @@
-//! The elements of SDF and URDF inside another one: those that are read, those without effect on
-//! the model, and those that would change it.
+//! Checks of the elements that are not read, and of values that the simulation fixes: those without
+//! effect on the model, and those that would change it.
 
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::did_you_mean;
+
+/// Acceleration by gravity in the simulation. Unit: m/s².
+const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 
 /// The children that an element may have.
 pub(crate) struct Children {
@@ -81,4 +84,10 @@ pub(crate) fn refuse_switch(parent: Node, name: &str, usual: bool, why: &str, re
         let help = format!("remove it, or write {usual}");
         reader.error("W035", node, why.to_owned(), help);
     }
+}
+
+/// Whether a file has the gravity of the simulation, up to a tolerance. Unit: m/s².
+pub(crate) fn is_usual_gravity(found: [f64; 3], tolerance: f64) -> bool {
+    let is_near = |(found, usual): (f64, f64)| (found - usual).abs() <= tolerance;
+    found.into_iter().zip(GRAVITY).all(is_near)
 }

@@ -13,7 +13,7 @@ use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::{Lookup, beside, spellings};
 use crate::foreign::nested::{SubModel, Tree};
 use crate::foreign::xml::{self, Node, Reader};
-use crate::foreign::{mjcf, sdf, tree_object, urdf};
+use crate::foreign::{mjcf, root_name, sdf, tree_object, urdf};
 use actcheck_base::{
     Diagnostic, Diagnostics, FileFault, Files, Severity, Source, did_you_mean, xml_text,
 };
@@ -242,11 +242,11 @@ pub(crate) fn included<'a>(
 ) -> Option<SubModel> {
     file.inclusions.check_room(uri, reader)?;
     let name = name_in(xml::text(uri));
-    let Some(found) = meant(xml::text(uri), file.path, file.lookup) else {
+    let Some(found) = named_by(xml::text(uri), file.path, file.lookup) else {
         let message = format!("the model `{name}` is missing");
         let known: Vec<&str> = known.collect();
         let help = match known.is_empty() {
-            true => "put its folder beside the others".to_owned(),
+            true => "put its folder beside those of the other models".to_owned(),
             false => did_you_mean(&name, known),
         };
         reader.error("W040", uri, message, help);
@@ -286,7 +286,7 @@ pub(crate) struct ModelText {
     pub(crate) source: Source,
 }
 
-/// Returns the text of the model that a URI in a file means; `None` if there is no such model.
+/// Returns the text of the model that a URI in a file names; `None` if the model is missing.
 ///
 /// # Errors
 /// Its file is unreadable (W030), or its `model.config` names none (W033).
@@ -295,16 +295,16 @@ pub(crate) fn text_of(
     file: &Path,
     lookup: &Lookup,
 ) -> Result<Option<ModelText>, Diagnostics> {
-    let Some(found) = meant(uri, file, lookup) else {
+    let Some(found) = named_by(uri, file, lookup) else {
         return Ok(None);
     };
     let Opened { path, text, .. } = Opened::of(&found, lookup)?;
     Ok(Some(ModelText { path, source: text }))
 }
 
-/// Finds the model that a URI in a file means. One without a scheme is first relative to the file,
+/// Finds the model that a URI in a file names. One without a scheme is first relative to the file,
 /// and then a path in the folders of models.
-fn meant(uri: &str, file: &Path, lookup: &Lookup) -> Option<Found> {
+fn named_by(uri: &str, file: &Path, lookup: &Lookup) -> Option<Found> {
     let by_name = || named(&name_in(uri), lookup);
     match is_path(uri) {
         true => at_path(uri, file, lookup).or_else(by_name),
@@ -395,33 +395,17 @@ fn model_file(files: &Files, folder: &Path) -> Option<PathBuf> {
         .find(|path| inside.contains(path))
 }
 
-/// Whether a file is MJCF: XML whose root is `<mujoco>`. A URDF may have such an element, too, but
-/// not as its root.
+/// Whether a file is MJCF: XML whose root is `<mujoco>`, or `<mujocoinclude>`. A URDF may have such an
+/// element, too, but not as its root.
 fn is_mjcf(files: &Files, path: &Path) -> bool {
     let is_xml = path.extension().is_some_and(|ending| ending == "xml");
+    let begins = |text: &str| root_name(text).is_some_and(|root| root.starts_with("mujoco"));
     is_xml
         && files.read_bytes(path).is_ok_and(|bytes| {
             // A file with faults in its encoding is MJCF, too; its reader reports them.
-            begins_with_mujoco(&String::from_utf8_lossy(&bytes))
-                || xml_text(bytes).is_ok_and(|text| begins_with_mujoco(&text))
+            begins(&String::from_utf8_lossy(&bytes))
+                || xml_text(bytes).is_ok_and(|text| begins(&text))
         })
-}
-
-/// Whether the first element of a text is `<mujoco>`.
-fn begins_with_mujoco(text: &str) -> bool {
-    let mut rest = text;
-    while let Some(at) = rest.find('<') {
-        rest = &rest[at..];
-        let end = if rest.starts_with("<!--") {
-            "-->"
-        } else if rest.starts_with("<?") || rest.starts_with("<!") {
-            ">"
-        } else {
-            return rest.starts_with("<mujoco");
-        };
-        rest = rest.split_once(end).map_or("", |(_, after)| after);
-    }
-    false
 }
 
 fn unreadable(path: &Path, reason: &FileFault) -> Diagnostic {

@@ -45,7 +45,15 @@ impl<'a> Shapes<'a> {
         if kind.tag_name().name() == "mesh" {
             return self.sdf_mesh(kind, reader);
         }
-        primitive(kind, reader)
+        match sdf_primitive(kind, reader)? {
+            Primitive::Geometry(TreeGeometry::Ellipsoid { radii }) => {
+                ellipsoid(radii).map(|mesh| Shape::Mesh { mesh })
+            }
+            Primitive::Geometry(geometry) => geometry.solid(),
+            Primitive::Cone { radius, length } => {
+                cone(radius, length).map(|mesh| Shape::Mesh { mesh })
+            }
+        }
     }
 
     fn sdf_mesh(&mut self, mesh: Node, reader: &mut Reader) -> Option<Shape> {
@@ -89,12 +97,7 @@ impl<'a> Shapes<'a> {
         scale: [f64; 3],
         found: &mut Diagnostics,
     ) -> Option<Shape> {
-        if scale.contains(&0.0) {
-            let fault = Diagnostic::error("W034", "the mesh's scale must not be 0")
-                .at(&place.source, xml::tag(place));
-            found.push(fault.help("write 1 for the file's own size"));
-            return None;
-        }
+        check_scale(scale, place, found)?;
         let mesh = self.unscaled(place, uri, found)?.scaled(scale);
         check_reach(&mesh, [1.0; 3], place, found).then(|| solid_of(mesh))
     }
@@ -165,6 +168,21 @@ fn solid_of(mesh: Mesh) -> Shape {
     Shape::Mesh { mesh }
 }
 
+/// Returns `Some` if a mesh has an extent along each axis. Otherwise reports W034 at a place.
+pub(crate) fn check_scale(
+    scale: [f64; 3],
+    place: &SourceSpan,
+    found: &mut Diagnostics,
+) -> Option<()> {
+    if !scale.contains(&0.0) {
+        return Some(());
+    }
+    let fault = Diagnostic::error("W034", "the mesh's scale must not be 0")
+        .at(&place.source, xml::tag(place));
+    found.push(fault.help("write 1 for the file's own size"));
+    None
+}
+
 /// Whether a scaled mesh is not too large. Otherwise reports W034 at a place.
 fn check_reach(mesh: &Mesh, scale: [f64; 3], place: &SourceSpan, found: &mut Diagnostics) -> bool {
     let along = |vertex: &[f64; 3]| {
@@ -194,64 +212,67 @@ pub(crate) fn kind_of<'n>(geometry: Node<'n>, reader: &mut Reader) -> Option<Nod
     kind
 }
 
-/// Reads a primitive shape of SDF.
-fn primitive(kind: Node, reader: &mut Reader) -> Option<Shape> {
-    let written = |name: &str, reader: &mut Reader| {
+/// A shape that is not that of a mesh file.
+pub(crate) enum Primitive {
+    Geometry(TreeGeometry),
+    /// With its tip above and its middle at the origin. Units: metres.
+    Cone {
+        radius: f64,
+        length: f64,
+    },
+}
+
+/// Reads a primitive of SDF. Returns `None` after it has reported a fault.
+pub(crate) fn sdf_primitive(kind: Node, reader: &mut Reader) -> Option<Primitive> {
+    primitive(kind, reader, |name, reader| {
         let node = reader.required(kind, name)?;
         Some((node, xml::text(node)))
-    };
+    })
+}
+
+/// Reads a primitive. `written` finds its parameters by name: elements in SDF, attributes in URDF.
+/// Returns `None` after it has reported a fault.
+pub(crate) fn primitive<'n>(
+    kind: Node<'n>,
+    reader: &mut Reader,
+    written: impl Fn(&str, &mut Reader) -> Option<(Node<'n>, &'n str)>,
+) -> Option<Primitive> {
     let number = |reader: &mut Reader, name: &str| {
         let (node, text) = written(name, reader)?;
         reader
             .numbers::<1>(node, text, Bound::Length)
             .map(|[number]| number)
     };
-    match kind.tag_name().name() {
-        "box" => {
-            let (node, text) = written("size", reader)?;
-            Some(Shape::Box {
-                size: reader.numbers(node, text, Bound::Length)?,
-            })
-        }
-        "cylinder" => {
-            let (radius, length) = (number(reader, "radius"), number(reader, "length"));
-            Some(Shape::Cylinder {
-                radius: radius?,
-                height: length?,
-            })
-        }
-        "capsule" => {
-            let (radius, length) = (number(reader, "radius"), number(reader, "length"));
-            Some(Shape::Capsule {
-                radius: radius?,
-                height: length?,
-            })
-        }
-        "sphere" => Some(Shape::Sphere {
+    let three = |reader: &mut Reader, name: &str| {
+        let (node, text) = written(name, reader)?;
+        reader.numbers::<3>(node, text, Bound::Length)
+    };
+    let geometry = match kind.tag_name().name() {
+        "box" => TreeGeometry::Box {
+            size: three(reader, "size")?,
+        },
+        "sphere" => TreeGeometry::Sphere {
             radius: number(reader, "radius")?,
-        }),
-        "ellipsoid" => {
-            let (node, text) = written("radii", reader)?;
-            Some(Shape::Mesh {
-                mesh: ellipsoid(reader.numbers(node, text, Bound::Length)?)?,
-            })
-        }
-        "cone" => {
+        },
+        "ellipsoid" => TreeGeometry::Ellipsoid {
+            radii: three(reader, "radii")?,
+        },
+        round @ ("cylinder" | "capsule" | "cone") => {
             let (radius, length) = (number(reader, "radius"), number(reader, "length"));
-            Some(Shape::Mesh {
-                mesh: cone(radius?, length?)?,
-            })
+            let (radius, length) = (radius?, length?);
+            match round {
+                "cylinder" => TreeGeometry::Cylinder { radius, length },
+                "capsule" => TreeGeometry::Capsule { radius, length },
+                _ => return Some(Primitive::Cone { radius, length }),
+            }
         }
         other => {
-            reader.error(
-                "W035",
-                kind,
-                format!("the geometry `<{other}>` can't be simulated"),
-                KINDS,
-            );
-            None
+            let message = format!("the geometry `<{other}>` can't be simulated");
+            reader.error("W035", kind, message, KINDS);
+            return None;
         }
-    }
+    };
+    Some(Primitive::Geometry(geometry))
 }
 
 /// Number of faces around a cone or an ellipsoid; from pole to pole, an ellipsoid has half as many.

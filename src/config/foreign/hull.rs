@@ -176,6 +176,7 @@ fn tetrahedron(points: &[[f64; 3]]) -> Option<[u32; 4]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::foreign::test_files::ball;
     use actcheck_data::Mesh;
 
     #[test]
@@ -194,18 +195,11 @@ mod tests {
     fn hulls_of_many_points_are_found_in_a_second() {
         let start = std::time::Instant::now();
         let n = 100_000;
-        let ball: Vec<[f64; 3]> = (0..n)
-            .map(|idx| {
-                let z = 1.0 - 2.0 * (f64::from(idx) + 0.5) / f64::from(n);
-                let (across, angle) = ((1.0 - z * z).sqrt(), 2.399_963 * f64::from(idx));
-                [across * angle.cos(), across * angle.sin(), z]
-            })
-            .collect();
         let grid: Vec<[f64; 3]> = (0..n)
             .map(|idx| [idx % 50, idx / 50 % 50, idx / 2_500].map(f64::from))
             .collect();
         for (points, volume) in [
-            (ball, 4.0 / 3.0 * std::f64::consts::PI),
+            (ball(n), 4.0 / 3.0 * std::f64::consts::PI),
             (grid, 49.0 * 49.0 * 39.0),
         ] {
             let mesh = Mesh::new(points.clone(), convex_hull(&points)).expect("it is a mesh");

@@ -1,10 +1,9 @@
 //! Models that include others: circles and growth are refused, and nothing of an included model is
 //! lost.
 
-use std::fs;
-
 use crate::foreign::folder::Found;
 use crate::foreign::lookup::Lookup;
+use crate::foreign::test_files::{folder, sdf, sdf_model as model};
 use crate::foreign::{read, robot, world};
 use actcheck_base::{Diagnostics, Files, Source};
 use actcheck_data::{ModelTree, ObjectModel};
@@ -17,13 +16,7 @@ struct Folder(tempfile::TempDir);
 
 impl Folder {
     fn new(files: &[(&str, String)]) -> Self {
-        let folder = tempfile::tempdir().expect("there is room");
-        for (path, text) in files {
-            let path = folder.path().join("m").join(path);
-            fs::create_dir_all(path.parent().expect("it is in a folder")).expect("it is new");
-            fs::write(path, text).expect("there is room");
-        }
-        Self(folder)
+        Self(folder("m", files))
     }
 
     fn lookup(&self) -> Lookup<'static> {
@@ -67,14 +60,6 @@ impl Folder {
     }
 }
 
-fn sdf(inside: &str) -> String {
-    format!("<sdf version=\"1.11\">{inside}</sdf>")
-}
-
-fn model(inside: &str) -> String {
-    sdf(&format!("<model name=\"thing\">{inside}</model>"))
-}
-
 fn link(name: &str) -> String {
     format!("<link name=\"{name}\">{SOLID}</link>")
 }
@@ -88,6 +73,11 @@ fn joint(kind: &str, [parent, child]: [&str; 2], axis: &str) -> String {
         "<joint name=\"{child}_joint\" type=\"{kind}\"><parent>{parent}</parent><child>{child}</child>\
          <axis><xyz>0 0 1</xyz>{axis}</axis></joint>"
     )
+}
+
+/// Two links, the second of which turns about the first.
+fn hinged() -> String {
+    link("a") + &link("b") + &joint("revolute", ["a", "b"], "")
 }
 
 /// A file that includes itself, or frames that refer in a circle, end in a fault and not never.
@@ -117,7 +107,7 @@ fn circles_end() {
         );
         assert!(world.is_none() && found.contains(said), "{found}");
     }
-    let nameless = "<model><link/></model>".replace("<link/>", "");
+    let nameless = "<model></model>";
     let inner = |inside: &str| format!("<model name=\"n\">{inside}</model>");
     for inside in [
         nameless.repeat(3),
@@ -214,13 +204,12 @@ fn the_parts_of_an_mjcf_object_have_their_own_friction() {
 
 #[test]
 fn an_included_model_keeps_its_collisions_with_itself() {
-    let hinged = |inside: &str| {
-        let joint = joint("revolute", ["a", "b"], "");
-        model(&format!("{inside}{}{}{joint}", link("a"), link("b")))
-    };
     let outer = model(&include("inner", ""));
     for (switch, is_refused) in [("true", true), ("false", false)] {
-        let inner = hinged(&format!("<self_collide>{switch}</self_collide>"));
+        let inner = model(&format!(
+            "<self_collide>{switch}</self_collide>{}",
+            hinged()
+        ));
         let files = [("inner/model.sdf", inner), ("a/model.sdf", outer.clone())];
         match Folder::new(&files).object("a/model.sdf") {
             Ok(_) => assert!(!is_refused),
@@ -241,12 +230,7 @@ fn infinite_limits_are_none() {
         ["-INFINITY", "+inf"],
     ] {
         let limit = format!("<limit><lower>{lower}</lower><upper>{upper}</upper></limit>");
-        let text = model(&format!(
-            "{}{}{}",
-            link("a"),
-            link("b"),
-            joint("revolute", ["a", "b"], &limit)
-        ));
+        let text = model(&hinged().replace("</axis>", &format!("{limit}</axis>")));
         let (model, _) = Folder::new(&[("a.sdf", text)])
             .object("a.sdf")
             .expect(lower);
@@ -305,11 +289,9 @@ fn plugins_of_an_include_are_read_or_named() {
     let coupling = "<plugin name=\"p\" filename=\"f\"><joint>k</joint><mimicJoint>j</mimicJoint><multiplier>2</multiplier></plugin>";
     let other = "<plugin name=\"q\" filename=\"f\"/>";
     let inner = format!(
-        "{}{}{}{}{}",
-        link("a"),
-        link("b"),
+        "{}{}{}",
+        hinged().replace("b_joint", "k"),
         link("c"),
-        joint("revolute", ["a", "b"], "").replace("b_joint", "k"),
         joint("revolute", ["a", "c"], "").replace("c_joint", "j")
     );
     let outer = |plugin: &str| model(&include("inner", &format!("<name>i</name>{plugin}")));
@@ -407,12 +389,7 @@ fn urdf_has_cones_and_names_geometries_that_it_lacks() {
 /// The height of a root `<include>` was said to be left out, but the robot hung in the air.
 #[test]
 fn a_robot_that_is_only_included_has_the_pose_of_a_scene() {
-    let arm = format!(
-        "{}{}{}",
-        link("a"),
-        link("b"),
-        joint("revolute", ["a", "b"], "")
-    );
+    let arm = hinged();
     let placed = format!("<pose>1 2 0.5 0 0.3 0</pose>{arm}");
     let folder = Folder::new(&[
         ("arm/model.sdf", model(&arm)),
@@ -459,14 +436,7 @@ fn a_body_of_an_mjcf_world_is_named_at_its_place() {
 #[test]
 fn fixed_joints_follow_no_other() {
     let mimic = "<mimic joint=\"b_joint\"><multiplier>1</multiplier></mimic>";
-    let hinged = joint("revolute", ["a", "b"], "");
-    let text = format!(
-        "{}{}{}{hinged}{}",
-        link("a"),
-        link("b"),
-        link("c"),
-        joint("fixed", ["b", "c"], mimic)
-    );
+    let text = hinged() + &link("c") + &joint("fixed", ["b", "c"], mimic);
     let urdf = "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/><joint name=\"j\" type=\"fixed\"><parent link=\"a\"/>\
                 <child link=\"b\"/><mimic joint=\"k\"/></joint></robot>";
     let folder = Folder::new(&[("a.sdf", model(&text)), ("b.urdf", urdf.to_owned())]);
@@ -486,21 +456,17 @@ fn loose_links_and_loops_are_all_reported_at_once() {
     let links: String = ["a", "b", "c", "d", "e", "f"].map(link).concat();
     let loose = format!("{links}{}{}", hinge(["a", "b"]), hinge(["c", "d"]));
     let twice = format!(
-        "{links}{}{}{}{}",
+        "{links}{}{}{}",
         ["b", "c", "d", "e", "f"]
             .map(|child| hinge(["a", child]))
             .concat(),
         hinge(["b", "c"]).replace("c_joint", "k"),
-        hinge(["d", "e"]).replace("e_joint", "l"),
-        ""
+        hinge(["d", "e"]).replace("e_joint", "l")
     );
     let folder = Folder::new(&[("a.sdf", model(&loose)), ("b.sdf", model(&twice))]);
     let said = folder.object("a.sdf").expect_err("they are loose");
     assert_eq!(said.matches("no joint connects").count(), 3, "{said}");
-    assert!(
-        said.contains("`c` and the 1 links joined to it") || said.contains("`c` and"),
-        "{said}"
-    );
+    assert!(said.contains("`c` and the link joined to it"), "{said}");
     let said = folder.object("b.sdf").expect_err("it has loops");
     assert_eq!(
         said.matches("two joints move the same links").count(),
@@ -682,7 +648,7 @@ fn objects_in_urdf_are_read_as_trees() {
         (link("b", solid), "the links form 2 trees"),
         (
             link("b", "") + &joint("fixed", "c", ""),
-            "there is no link `c`",
+            "the model has no link `c`",
         ),
         (link("a", solid), "there are two links `a`"),
         (

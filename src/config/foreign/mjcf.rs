@@ -1,8 +1,8 @@
 //! Reads a robot or an object in MJCF, MuJoCo's format: bodies, joints, geoms, inertias, equalities
 //! of joints.
 //!
-//! Sites and cameras become links, so that a profile can name them. Spatial tendons and options are
-//! not read.
+//! Sites and cameras become links, so that a profile can name them. Spatial tendons are left out with
+//! a warning, and of the options only another gravity is reported.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,15 +11,14 @@ use std::rc::Rc;
 
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
-use crate::foreign::geom_mass::{GeomMass, MeshMasses};
 use crate::foreign::lookup::{Lookup, beside};
 use crate::foreign::mjcf_budget::Budget;
-use crate::foreign::mjcf_compiler::{
-    Compiler, Item, MjcfAttributes, Whole, is_absolute, with_includes,
-};
+use crate::foreign::mjcf_compiler::{Compiler, Item, MjcfAttributes, Whole, with_includes};
 use crate::foreign::mjcf_couplings::Couplings;
 use crate::foreign::mjcf_elements;
+use crate::foreign::mjcf_graft::Graft;
 use crate::foreign::mjcf_masks::{Contacts, Mask, collides};
+use crate::foreign::solid_mass::{MeshMasses, SolidMass};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostic, Diagnostics, Source, SourceSpan};
 use actcheck_data::{
@@ -32,7 +31,7 @@ const EFFORT: f64 = 100.0;
 const VELOCITY: [f64; 2] = [2.0, 0.5];
 /// Range of an unlimited sliding joint. Unit: metres.
 const SLIDES_M: f64 = 10.0;
-/// Deepest attachment of models to others: deeper ones attach themselves.
+/// Most models in a chain of attachments: a longer chain comes back to its first model.
 const DEEPEST: usize = 8;
 
 /// A tree, its text with those of all included files and attached models, and warnings.
@@ -170,7 +169,7 @@ pub(super) fn with_model<T>(
     Ok((read, text, said))
 }
 
-/// A name that no other has.
+/// Makes a name unique: a further one gets a number at its end.
 pub(super) fn unique(names: &mut BTreeMap<String, u32>, name: &str) -> String {
     let count = names.entry(name.to_owned()).or_insert(0);
     *count += 1;
@@ -200,7 +199,7 @@ pub(super) struct File<'a> {
 }
 
 impl<'a> File<'a> {
-    /// A file that is attached to no other.
+    /// The file of the outermost model.
     pub(super) fn first(path: &'a Path, lookup: &'a Lookup<'a>, budget: &'a Budget) -> Self {
         Self {
             path,
@@ -241,7 +240,7 @@ pub(super) struct Model<'a> {
 }
 
 impl Model<'_> {
-    /// A name that no other link has.
+    /// Makes the name of a link unique.
     pub(super) fn unique(&mut self, name: &str) -> String {
         unique(&mut self.names, name)
     }
@@ -823,7 +822,7 @@ impl Model<'_> {
                     reader.found.push(fault.help(help));
                 }
             }
-            let GeomMass { kg, com, about_com } = masses.together(heavy, &meshes);
+            let SolidMass { kg, com, about_com } = masses.together(heavy, &meshes);
             if kg > 0.0 || rules.masses.least[0] > 0.0 {
                 let inertial = TreeInertial {
                     pose: Isometry3::translation(com.x, com.y, com.z),
@@ -877,96 +876,6 @@ fn refused_body(node: Node, body: &str, path: &Path, reader: &mut Reader) {
     );
 }
 
-/// The part of a tree that is attached to another, with new names.
-struct Graft<'a> {
-    prefix: &'a str,
-    /// Folder of its file, relative to that of the other.
-    folder: &'a str,
-    /// The body whose subtree is taken; `None` for all.
-    body: Option<&'a str>,
-}
-
-impl Graft<'_> {
-    /// Returns the part below its root; `None` if there is no such body.
-    fn of(&self, mut tree: ModelTree) -> Option<ModelTree> {
-        let root = tree.links.first()?.name.clone();
-        if let Some(body) = self.body {
-            let mut kept = BTreeSet::from([body.to_owned()]);
-            // The links between a body's joints are its own.
-            let mut above = body.to_owned();
-            while let Some(joint) = tree.joints.iter().find(|joint| joint.child == above)
-                && joint.parent != root
-                && joint.parent.starts_with(&format!("{body}_"))
-            {
-                above.clone_from(&joint.parent);
-                kept.insert(above.clone());
-            }
-            for joint in &mut tree.joints {
-                if joint.child == above {
-                    joint.parent.clone_from(&root);
-                }
-            }
-            loop {
-                let n_known = kept.len();
-                let below = tree
-                    .joints
-                    .iter()
-                    .filter(|joint| kept.contains(&joint.parent));
-                let below: Vec<String> = below.map(|joint| joint.child.clone()).collect();
-                kept.extend(below);
-                if kept.len() == n_known {
-                    break;
-                }
-            }
-            tree.link(body)?;
-            tree.joints.retain(|joint| kept.contains(&joint.child));
-            tree.links
-                .retain(|link| link.name == root || kept.contains(&link.name));
-            if let Some(world) = tree.links.first_mut() {
-                (world.solids, world.visuals) = (Vec::new(), Vec::new());
-            }
-            tree.passing
-                .retain(|pair| pair.iter().all(|name| kept.contains(name)));
-        }
-        self.rename(&mut tree, &root);
-        Some(tree)
-    }
-
-    fn rename(&self, tree: &mut ModelTree, root: &str) {
-        let named = |name: &mut String| {
-            if name != root {
-                name.insert_str(0, self.prefix);
-            }
-        };
-        for link in &mut tree.links {
-            named(&mut link.name);
-            for solid in link.solids.iter_mut().chain(&mut link.visuals) {
-                if let actcheck_data::TreeGeometry::Mesh { file, .. } = &mut solid.geometry {
-                    if tree.inline_meshes.contains_key(file) {
-                        file.insert_str(0, self.prefix);
-                    } else if !self.folder.is_empty() && !is_absolute(file) {
-                        *file = format!("{}/{file}", self.folder);
-                    }
-                }
-            }
-        }
-        for joint in &mut tree.joints {
-            joint.name.insert_str(0, self.prefix);
-            named(&mut joint.parent);
-            named(&mut joint.child);
-            if let Some(mimic) = &mut joint.mimic {
-                mimic.leader.insert_str(0, self.prefix);
-            }
-        }
-        tree.passing.iter_mut().flatten().for_each(named);
-        let meshes = std::mem::take(&mut tree.inline_meshes);
-        tree.inline_meshes = meshes
-            .into_iter()
-            .map(|(name, mesh)| (format!("{}{name}", self.prefix), mesh))
-            .collect();
-    }
-}
-
 /// Reads the mass of an `<inertial>`. Returns `None` after it has reported a fault.
 fn inertial(
     item: &Item<'_>,
@@ -1011,298 +920,4 @@ fn lens() -> Isometry3<f64> {
     let axes = Matrix3::from_columns(&[-Vector3::z(), -Vector3::x(), Vector3::y()]);
     let turned = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
     Isometry3::from_parts(Translation3::identity(), turned)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use actcheck_base::Files;
-    use std::f64::consts::FRAC_PI_6;
-
-    fn read(bodies: &str, more: &str) -> Result<ModelTree, Diagnostics> {
-        let text = format!(
-            "<mujoco><compiler angle=\"radian\"/><worldbody>{bodies}</worldbody>{more}</mujoco>"
-        );
-        let lookup = Lookup {
-            files: &Files::Shipped,
-            folders: Vec::new(),
-        };
-        let source = Source::new("robot.xml", text);
-        robot(&source, Path::new("robot.xml"), &lookup).map(|(tree, ..)| tree)
-    }
-
-    /// Reads the first of some files in one folder.
-    fn read_files(files: &[(&str, &str)]) -> Result<ModelTree, String> {
-        let folder = tempfile::tempdir().expect("there is room");
-        for (path, text) in files {
-            let path = folder.path().join(path);
-            std::fs::create_dir_all(path.parent().expect("a folder")).expect("it is new");
-            std::fs::write(path, text).expect("there is room");
-        }
-        let lookup = Lookup {
-            files: &Files::Disk,
-            folders: Vec::new(),
-        };
-        let (name, text) = files[0];
-        let source = Source::new(name, text.to_owned());
-        robot(&source, &folder.path().join(name), &lookup)
-            .map(|(tree, ..)| tree)
-            .map_err(|faults| faults.to_string())
-    }
-
-    /// A few lines ask for billions of bodies, of files, or of attached models.
-    #[test]
-    fn models_that_explode_are_refused_at_once() {
-        let said = |files: &[(&str, &str)]| {
-            let start = std::time::Instant::now();
-            let said = read_files(files).expect_err("it is far too large");
-            assert!(said.contains("W055"), "{said}");
-            assert!(said.matches("error").count() <= 2, "{said}");
-            assert!(start.elapsed().as_secs_f64() < 5.0, "{:?}", start.elapsed());
-            said
-        };
-        let nested = |open: &str, close: &str, n: usize| {
-            let inside = "<geom size=\"0.1\"/>";
-            let body = format!("{}{inside}{}", open.repeat(n), close.repeat(n));
-            format!("<mujoco><worldbody>{body}</worldbody></mujoco>")
-        };
-        let copies = "<replicate count=\"1000\">";
-        let bodies = nested(&format!("{copies}<body>"), "</body></replicate>", 3);
-        assert!(said(&[("a.xml", &bodies)]).contains("more than 1000 bodies"));
-        let geoms = nested(copies, "</replicate>", 5);
-        assert!(said(&[("a.xml", &geoms)]).contains("more than 10000 elements"));
-        let frames = nested("<frame>", "</frame>", 900);
-        assert!(said(&[("a.xml", &frames)]).contains("frames in each other"));
-        said(&[("a.xml", &nested("<body>", "</body>", 4_000))]);
-
-        let include = |n: usize| {
-            let twice = format!("<include file=\"{}.xml\"/>", n + 1).repeat(8);
-            (format!("{n}.xml"), format!("<mujoco>{twice}</mujoco>"))
-        };
-        let mut files: Vec<(String, String)> = (0..7).map(include).collect();
-        files.push((
-            "7.xml".to_owned(),
-            "<mujoco><worldbody/></mujoco>".to_owned(),
-        ));
-        let of = |files: &[(String, String)]| -> String {
-            let files: Vec<(&str, &str)> = files
-                .iter()
-                .map(|(name, text)| (name.as_str(), text.as_str()))
-                .collect();
-            said(&files)
-        };
-        assert!(of(&files).contains("more than 1000 files"));
-
-        let attach = |n: usize| {
-            let asset = format!("<asset><model name=\"m\" file=\"{}.xml\"/></asset>", n + 1);
-            let bodies: String = (0..8)
-                .map(|idx| format!("<frame><attach model=\"m\" prefix=\"{idx}_\"/></frame>"))
-                .collect();
-            let text = format!("<mujoco>{asset}<worldbody>{bodies}</worldbody></mujoco>");
-            (format!("{n}.xml"), text)
-        };
-        let mut files: Vec<(String, String)> = (0..7).map(attach).collect();
-        files.push((
-            "7.xml".to_owned(),
-            "<mujoco><worldbody/></mujoco>".to_owned(),
-        ));
-        assert!(of(&files).contains("more than 1000 files"));
-        files[7].1 = "<mujoco><worldbody><body/></worldbody></mujoco>".to_owned();
-        of(&files);
-    }
-
-    /// The mass of a link.
-    fn kg(tree: &ModelTree, link: &str) -> f64 {
-        let link = tree.link(link).expect("it has the link");
-        link.inertial.as_ref().map_or(0.0, |inertial| inertial.kg)
-    }
-
-    const BALL: &str = "<geom size=\"0.1\"/>";
-
-    /// MuJoCo leaves out the contacts of pairs that the file excludes, and of geoms whose masks
-    /// don't meet.
-    #[test]
-    fn bodies_that_never_collide_are_named() {
-        let bodies = format!(
-            "<body name=\"a\">{BALL}<body name=\"b\">{BALL}</body></body><body name=\"c\">{BALL}</body>\
-             <body name=\"d\"><geom size=\"0.1\" contype=\"2\" conaffinity=\"4\"/></body>"
-        );
-        let more = "<contact><exclude body1=\"c\" body2=\"a\"/></contact>";
-        let tree = read(&bodies, more).expect("it is valid");
-        let pairs = [["a", "c"], ["a", "d"], ["b", "d"], ["c", "d"]];
-        assert_eq!(tree.passing, pairs.map(|pair| pair.map(str::to_owned)));
-    }
-
-    /// Names of bodies and joints don't exclude each other; only a whole robot may move freely;
-    /// `ref` is the position at which the body is where the file puts it.
-    #[test]
-    fn joints_keep_their_names_and_positions() {
-        let bodies = format!(
-            "<body name=\"base\"><freejoint/>{BALL}<body name=\"jaw\" pos=\"0 0 1\">\
-             <joint name=\"jaw\" axis=\"1 0 0\" ref=\"0.5\" range=\"0 1\"/>{BALL}</body></body>"
-        );
-        let tree = read(&bodies, "").expect("it is valid");
-        let base = tree.joint("base_free").expect("it moves freely");
-        assert_eq!(base.motion, TreeMotion::Floating);
-        let jaw = tree.joint("jaw").expect("it has a jaw");
-        let roll_rad = jaw.origin.rotation.euler_angles().0;
-        assert!((roll_rad + 0.5).abs() < 1e-9, "{roll_rad}");
-    }
-
-    /// A part that would be missing without a word.
-    #[test]
-    fn bodies_of_unknown_models_are_refused() {
-        let said = read(
-            "<body name=\"a\"><attach model=\"hand\" body=\"palm\" prefix=\"h_\"/></body>",
-            "",
-        );
-        let said = said.expect_err("a hand is missing").to_string();
-        assert!(
-            said.contains("W035") && said.contains("to attach"),
-            "{said}"
-        );
-    }
-
-    /// Frames move the joints, geoms and bodies in them; a second `<worldbody>` counts as the
-    /// first; copies are numbered and each moves on from the one before it.
-    #[test]
-    fn frames_copies_and_further_worlds_are_read() {
-        let bodies = format!(
-            "<body name=\"a\"><frame pos=\"0 0 1\" euler=\"0 0 1.5707963267948966\">\
-             <joint name=\"turn\" axis=\"1 0 0\" pos=\"0.5 0 0\"/>{BALL}<body name=\"b\" pos=\"1 0 0\">{BALL}</body>\
-             </frame></body></worldbody><worldbody><replicate count=\"12\" offset=\"0.5 0 0\" sep=\"_\">\
-             <body name=\"c\" pos=\"0 0 2\">{BALL}</body></replicate>"
-        );
-        let tree = read(&bodies, "").expect("it is valid");
-        let near = |at: Isometry3<f64>, expected: [f64; 3]| {
-            let off = (at.translation.vector - Vector3::from(expected)).norm();
-            assert!(off < 1e-9, "{at} instead of {expected:?}");
-        };
-        let turn = tree.joint("turn").expect("it has the joint");
-        near(turn.origin, [0.0, 0.5, 1.0]);
-        assert!((turn.axis - Vector3::y()).norm() < 1e-9);
-        let geom = &tree.link("a").expect("it has the body").solids[0];
-        near(geom.pose, [0.0, -0.5, 0.0]);
-        near(
-            tree.joint("b_fixed").expect("it is fixed").origin,
-            [0.0, 0.5, 0.0],
-        );
-        near(
-            tree.joint("c_11_fixed").expect("it is a copy").origin,
-            [5.5, 0.0, 2.0],
-        );
-        assert!(tree.link("c_12").is_none());
-    }
-
-    /// The masses of geoms by their own densities, of those that don't collide too, but for other
-    /// groups; `<general>` defaults of forces reach `<position>`.
-    #[test]
-    fn masses_and_forces_have_their_defaults() {
-        let geoms = "<geom type=\"box\" size=\"0.05 0.05 0.05\" density=\"500\"/>\
-                     <geom type=\"box\" size=\"0.05 0.05 0.05\" mass=\"2\" contype=\"0\" conaffinity=\"0\"/>\
-                     <geom type=\"box\" size=\"0.05 0.05 0.05\" group=\"4\"/>";
-        let bodies = format!("<body name=\"a\"><joint name=\"j\"/>{geoms}</body>");
-        let more = "<compiler inertiagrouprange=\"0 3\"/>\
-                    <default><default class=\"weak\"><general forcerange=\"-4 4\"/></default></default>\
-                    <actuator><position class=\"weak\" joint=\"j\"/></actuator>";
-        let tree = read(&bodies, more).expect("it is valid");
-        assert!((kg(&tree, "a") - 2.5).abs() < 1e-9);
-        assert_eq!(tree.joint("j").map(|joint| joint.effort), Some(4.0));
-    }
-
-    /// The gain and the bias of a class of servos reach `<general>`: its signal is a position, and
-    /// not a force.
-    #[test]
-    fn an_actuator_has_the_kind_of_its_defaults() {
-        let bodies =
-            "<body name=\"a\"><joint name=\"j\"/><geom type=\"sphere\" size=\"0.1\"/></body>";
-        let effort = |defaults: &str| {
-            let more = format!(
-                "<default><default class=\"c\">{defaults}</default></default>\
-                 <actuator><general class=\"c\" joint=\"j\" ctrlrange=\"-0.5 0.5\" gear=\"2\"/></actuator>"
-            );
-            let tree = read(bodies, &more).expect("it is valid");
-            tree.joint("j").map(|joint| joint.effort)
-        };
-        let servo = effort("<position kp=\"500\" forcerange=\"-3 3\"/>");
-        assert_eq!(servo, Some(6.0));
-        assert_eq!(effort("<motor forcerange=\"-3 3\"/>"), Some(1.0));
-        assert_eq!(effort("<position kp=\"9\"/><motor/>"), Some(1.0));
-    }
-
-    /// Bodies without a mass are raised to the least one; an attached model is weighed by its own
-    /// rules alone, but the mass of the whole is that of all bodies. (As in MuJoCo 3.3.1.)
-    #[test]
-    fn masses_follow_the_rules_of_their_own_file() {
-        let arm = |rules: &str| {
-            format!(
-                "<mujoco><compiler {rules}/><asset><model name=\"h\" file=\"h.xml\"/></asset><worldbody>\
-                 <body name=\"a\"><joint/><geom size=\"0.05\"/><body name=\"empty\"><site name=\"s\"/></body>\
-                 <frame><attach model=\"h\" body=\"h\" prefix=\"p_\"/></frame></body></worldbody></mujoco>"
-            )
-        };
-        let hand = |rules: &str| {
-            format!(
-                "<mujoco><compiler {rules}/><worldbody><body name=\"h\"><joint/><geom size=\"0.01\"/></body>\
-                 </worldbody></mujoco>"
-            )
-        };
-        for (of_arm, of_hand, masses) in [
-            ("", "", [FRAC_PI_6, 0.0, 0.004_189]),
-            (
-                "",
-                "boundmass=\"3\" boundinertia=\"0.3\"",
-                [FRAC_PI_6, 0.0, 3.0],
-            ),
-            ("boundmass=\"7\"", "boundmass=\"3\"", [7.0, 7.0, 3.0]),
-            ("boundmass=\"7\"", "", [7.0, 7.0, 0.004_189]),
-            ("", "settotalmass=\"5\"", [FRAC_PI_6, 0.0, 0.004_189]),
-            (
-                "settotalmass=\"9\"",
-                "settotalmass=\"5\"",
-                [8.928_571, 0.0, 0.071_429],
-            ),
-        ] {
-            let tree = read_files(&[("a.xml", &arm(of_arm)), ("h.xml", &hand(of_hand))]);
-            let tree = tree.expect("it is valid");
-            for (link, expected) in ["a", "empty", "p_h"].into_iter().zip(masses) {
-                let found = kg(&tree, link);
-                assert!(
-                    (found - expected).abs() < 1e-5,
-                    "{link}: {found}, {of_arm}, {of_hand}"
-                );
-            }
-            assert!(tree.link("s").is_some_and(|site| site.inertial.is_none()));
-        }
-        let said = read_files(&[("a.xml", &hand("inertiafromgeom=\"false\""))]);
-        assert!(said.is_err_and(|said| said.contains("moves and has no mass")));
-        let tree = read_files(&[("a.xml", &hand("inertiafromgeom=\"false\" boundmass=\"2\""))]);
-        assert!((kg(&tree.expect("it is valid"), "h") - 2.0).abs() < 1e-9);
-    }
-
-    /// A box between two points is as deep as it is wide, and a mesh of vertices alone is their
-    /// hull.
-    #[test]
-    fn shapes_are_as_mujoco_has_them() {
-        let bodies = "<body name=\"a\"><geom type=\"box\" size=\"0.02\" fromto=\"0 0 0 0 0 0.12\"/></body>\
-                      <body name=\"b\"><geom type=\"mesh\" mesh=\"m\" density=\"100\"/></body>\
-                      <body name=\"c\"><geom type=\"box\" mesh=\"m\"/></body>";
-        let more = "<asset><mesh name=\"m\" vertex=\"0 0 0 1 0 0 0 2 0 1 2 0 0 0 3 1 0 3 0 2 3 1 2 3\"/></asset>";
-        let tree = read(bodies, more).expect("it is valid");
-        let size = |link: &str| {
-            let shape = tree.link(link)?.solids[0].geometry.solid()?;
-            match shape {
-                actcheck_data::Shape::Box { size } => Some(size),
-                _ => None,
-            }
-        };
-        let near = |found: Option<[f64; 3]>, expected: [f64; 3]| {
-            let found = found.expect("it is a box");
-            let off = (Vector3::from(found) - Vector3::from(expected)).norm();
-            assert!(off < 1e-9, "{found:?}");
-        };
-        near(size("a"), [0.04, 0.04, 0.12]);
-        near(size("c"), [1.0, 2.0, 3.0]);
-        assert!((kg(&tree, "b") - 600.0).abs() < 1e-9);
-    }
 }

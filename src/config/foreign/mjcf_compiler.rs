@@ -14,7 +14,7 @@ use crate::foreign::xml::{self, Bound, Node, Pieces, Reader};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Source, did_you_mean};
 use actcheck_data::{Spread, TreeInertial};
 
-/// Deepest inclusion of files: deeper ones include themselves.
+/// Most files in a chain of inclusions: a longer chain comes back to its first file.
 const DEEPEST: usize = 8;
 /// Most copies of a `<replicate>`.
 const MOST_COPIES: usize = 1_000;
@@ -218,18 +218,8 @@ impl Compiler {
             limits_itself: true,
             fits_boxes: false,
         };
-        if root.tag_name().name() != "mujoco" {
-            let message = format!(
-                "the root is `<{}>` instead of `<mujoco>`",
-                root.tag_name().name()
-            );
-            reader.error(
-                "W032",
-                root,
-                message,
-                "an MJCF file begins with `<mujoco model=\"…\">`",
-            );
-        }
+        let help = "an MJCF file begins with `<mujoco model=\"…\">`";
+        reader.root(root, "mujoco", help);
         let mut folders = Folders::default();
         for settings in xml::children(root, "compiler") {
             compiler.read_settings(settings, &mut folders, reader);
@@ -544,8 +534,8 @@ impl Compiler {
         Some((count, step))
     }
 
-    /// Returns the two ends of a range of an element, unless it is switched off: without a word
-    /// about it, an empty range is none. Returns `None` after it has reported a fault, too.
+    /// Returns the two ends of a range of an element, unless it is switched off; `None`
+    /// if the range is empty and `limited` does not ask for it, and after it has reported a fault.
     pub(super) fn limits(
         &self,
         node: Node,

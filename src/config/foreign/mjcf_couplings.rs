@@ -30,9 +30,12 @@ impl NamedJoint {
         }
     }
 
-    /// The fault that there is no such joint.
+    /// Returns the error for a joint that the model lacks (W051).
     pub(super) fn unknown(&self) -> Diagnostic {
-        let message = format!("there is no movable joint `{}` to {}", self.name, self.role);
+        let message = format!(
+            "the model has no movable joint `{}` to {}",
+            self.name, self.role
+        );
         Diagnostic::error("W051", message)
             .at(&self.place.source, xml::tag(&self.place))
             .help(self.key)

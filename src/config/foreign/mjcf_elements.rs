@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::foreign::elements::is_usual_gravity;
 use crate::foreign::mjcf::Purpose;
 use crate::foreign::mjcf_couplings::elements;
 use crate::foreign::xml::{self, Bound, Node, Reader};
@@ -15,9 +16,7 @@ const SCHEMA: &str = include_str!("mjcf_schema.txt");
 
 /// Elements with the children of a body.
 const LIKE_BODIES: [&str; 4] = ["body", "worldbody", "frame", "replicate"];
-/// Acceleration of the simulation, and the largest difference from it that is not reported. Unit:
-/// m/s².
-const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
+/// Largest difference from the simulation's gravity that is not reported. Unit: m/s².
 const GRAVITY_TOLERANCE: f64 = 0.05;
 
 /// Reports elements and attributes that are unknown (W036, W035 in bodies), and those that would
@@ -146,15 +145,14 @@ fn check_equalities(root: Node, purpose: Purpose, reader: &mut Reader) {
     }
 }
 
-/// Reports another gravity than that of the simulation: a world with it would be another one.
+/// Reports gravity that differs from that of the simulation: in a world, it is an error (W035).
 fn check_options(root: Node, purpose: Purpose, reader: &mut Reader) {
     for option in xml::children(root, "option") {
         let mut differs =
             xml::children(option, "flag").any(|flag| flag.attribute("gravity") == Some("disable"));
         if let Some(written) = option.attribute("gravity") {
             let found = reader.numbers::<3>(option, written, Bound::Finite);
-            let is_near = |(found, usual): (f64, f64)| (found - usual).abs() <= GRAVITY_TOLERANCE;
-            differs |= found.is_some_and(|found| !found.into_iter().zip(GRAVITY).all(is_near));
+            differs |= found.is_some_and(|found| !is_usual_gravity(found, GRAVITY_TOLERANCE));
         }
         if !differs {
             continue;

@@ -4,12 +4,12 @@ use std::rc::Rc;
 
 use nalgebra::{Isometry3, Point3};
 
-use crate::foreign::geom_mass::equivalent_box;
 use crate::foreign::geometry::Shapes;
 use crate::foreign::hull::convex_hull;
 use crate::foreign::mjcf::Model;
 use crate::foreign::mjcf_compiler::{Compiler, Item, MeshAsset, MjcfAttributes};
 use crate::foreign::mjcf_masks::{Mask, collides};
+use crate::foreign::solid_mass::equivalent_box;
 use crate::foreign::xml::{Bound, LONGEST, Node, Reader};
 use actcheck_data::{Amount, Matter, Mesh, Shape, Spread, TreeGeometry, TreeSolid};
 
@@ -184,7 +184,7 @@ impl<'a> Model<'a> {
     fn asset(&self, name: &str, geom: Node, reader: &mut Reader) -> Option<Rc<MeshAsset>> {
         let found = self.compiler.meshes.get(name).cloned();
         if found.is_none() {
-            let message = format!("there is no mesh `{name}` in `<asset>`");
+            let message = format!("`<asset>` has no mesh `{name}`");
             let help = "add `<mesh name=\"…\" file=\"…\"/>` to `<asset>`";
             reader.error("W035", geom, message, help);
         }

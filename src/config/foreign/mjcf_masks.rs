@@ -98,7 +98,7 @@ impl Contacts {
             let (Some(one), Some(other)) = (body(one), body(other)) else {
                 let name = unknown.unwrap_or_default();
                 let what = if is_pair { "geom" } else { "body" };
-                let message = format!("this contact is left out: there is no {what} `{name}`");
+                let message = format!("this contact is left out: the model has no {what} `{name}`");
                 let help = "copies have their number at the end of their name";
                 reader.warning("W036", contact, message, help);
                 continue;

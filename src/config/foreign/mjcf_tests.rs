@@ -1,24 +1,15 @@
 //! Robots, objects and worlds of MJCF have the values that MuJoCo 3.3.1 gives them, or are refused.
 
+use std::f64::consts::FRAC_PI_6;
 use std::path::Path;
 
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
 use crate::foreign::lookup::Lookup;
+use crate::foreign::test_files::{ball, folder};
 use crate::foreign::{mjcf, mjcf_world};
 use actcheck_base::{Diagnostics, Files, Source};
-use actcheck_data::{ModelTree, TreeGeometry, TreeJoint, TreeMotion};
-
-/// A folder with these files.
-fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().expect("there is room");
-    for (path, text) in files {
-        let path = folder.path().join(path);
-        std::fs::create_dir_all(path.parent().expect("a folder")).expect("it is new");
-        std::fs::write(path, text).expect("there is room");
-    }
-    folder
-}
+use actcheck_data::{ModelTree, Shape, TreeGeometry, TreeJoint, TreeMotion};
 
 type Read = Result<(ModelTree, Diagnostics), String>;
 
@@ -27,7 +18,7 @@ fn with_first<T>(
     files: &[(&str, &str)],
     read: impl FnOnce(&Source, &Path, &Lookup) -> Result<T, Diagnostics>,
 ) -> Result<T, String> {
-    let folder = folder(files);
+    let folder = folder("", files);
     let lookup = Lookup {
         files: &Files::Disk,
         folders: Vec::new(),
@@ -56,6 +47,22 @@ fn file(bodies: &str, more: &str) -> String {
 
 fn text(bodies: &str, more: &str) -> Read {
     robot(&[("a.xml", &file(bodies, more))])
+}
+
+fn tree(bodies: &str, more: &str) -> Result<ModelTree, String> {
+    text(bodies, more).map(|(tree, _)| tree)
+}
+
+fn tree_of(files: &[(&str, &str)]) -> Result<ModelTree, String> {
+    robot(files).map(|(tree, _)| tree)
+}
+
+/// A file that has the model `h` of another one, with attributes of its `<compiler>`.
+fn attaching(compiler: &str, other: &str, bodies: &str, more: &str) -> String {
+    format!(
+        "<mujoco><compiler {compiler}/><asset><model name=\"h\" file=\"{other}\"/></asset>\
+         <worldbody>{bodies}</worldbody>{more}</mujoco>"
+    )
 }
 
 /// A body with a joint and a ball, and attributes of both.
@@ -241,11 +248,9 @@ fn pairs_collide_whatever_the_masks_say() {
 #[test]
 fn attached_joints_are_driven_from_outside() {
     let outer = |more: &str| {
-        format!(
-            "<mujoco><compiler angle=\"radian\"/><asset><model name=\"h\" file=\"sub/h.xml\"/></asset><worldbody>\
-             <body name=\"a\"><joint name=\"k\"/><geom size=\"0.05\"/>\
-             <frame><attach model=\"h\" body=\"h\" prefix=\"p_\"/></frame></body></worldbody>{more}</mujoco>"
-        )
+        let bodies = "<body name=\"a\"><joint name=\"k\"/><geom size=\"0.05\"/>\
+                      <frame><attach model=\"h\" body=\"h\" prefix=\"p_\"/></frame></body>";
+        attaching("angle=\"radian\"", "sub/h.xml", bodies, more)
     };
     let inner = "<mujoco><compiler angle=\"radian\"/><worldbody><body name=\"h\">\
                  <joint name=\"j\" ref=\"0.25\"/><geom size=\"0.01\" contype=\"4\" conaffinity=\"4\"/></body></worldbody></mujoco>";
@@ -280,12 +285,11 @@ fn attached_joints_are_driven_from_outside() {
 /// Two models with different attached models are different, even in their texts.
 #[test]
 fn the_text_of_a_model_has_that_of_attached_ones() {
-    let outer = "<mujoco><asset><model name=\"h\" file=\"h.xml\"/></asset><worldbody>\
-                 <attach model=\"h\" prefix=\"p_\"/></worldbody></mujoco>";
+    let outer = attaching("", "h.xml", "<attach model=\"h\" prefix=\"p_\"/>", "");
     let read = |size: &str| {
         let inner = file(&format!("<body><geom size=\"{size}\"/></body>"), "");
         with_first(
-            &[("a.xml", outer), ("h.xml", &inner)],
+            &[("a.xml", &outer), ("h.xml", &inner)],
             |source, path, lookup| {
                 mjcf::robot(source, path, lookup).map(|(_, text, _)| text.text.to_string())
             },
@@ -312,12 +316,12 @@ fn copies_of_joints_are_driven_too() {
 /// A mesh of an attached model is in the folder of its own file, and an absolute path is itself.
 #[test]
 fn meshes_are_named_from_the_right_folder() {
-    let outer = "<mujoco><compiler meshdir=\"other\"/><asset><model name=\"h\" file=\"sub\\h.xml\"/></asset><worldbody>\
-                 <body name=\"a\"><geom size=\"0.05\"/><attach model=\"h\" body=\"h\" prefix=\"p_\"/></body></worldbody></mujoco>";
+    let bodies = "<body name=\"a\"><geom size=\"0.05\"/><attach model=\"h\" body=\"h\" prefix=\"p_\"/></body>";
+    let outer = attaching("meshdir=\"other\"", "sub\\h.xml", bodies, "");
     let inner = "<mujoco><compiler meshdir=\"meshes\"/><asset><mesh name=\"m\" file=\"t.stl\"/><mesh name=\"n\" file=\"/far/t.stl\"/>\
                  </asset><worldbody><body name=\"h\"><geom type=\"mesh\" mesh=\"m\" mass=\"0\"/>\
                  <geom type=\"mesh\" mesh=\"n\" mass=\"0\"/><inertial pos=\"0 0 0\" mass=\"1\" diaginertia=\"1 1 1\"/></body></worldbody></mujoco>";
-    let (tree, _) = robot(&[("a.xml", outer), ("sub/h.xml", inner)]).expect("it is valid");
+    let (tree, _) = robot(&[("a.xml", &outer), ("sub/h.xml", inner)]).expect("it is valid");
     let files: Vec<&str> = tree
         .link("p_h")
         .expect("it is attached")
@@ -364,11 +368,11 @@ fn huge_numbers_end() {
 /// An attached model has the angles of its own file.
 #[test]
 fn attached_angles_are_those_of_their_file() {
-    let outer = "<mujoco><compiler angle=\"degree\" eulerseq=\"xyz\"/><asset><model name=\"h\" file=\"h.xml\"/></asset>\
-                 <worldbody><attach model=\"h\" prefix=\"p_\"/></worldbody></mujoco>";
+    let bodies = "<attach model=\"h\" prefix=\"p_\"/>";
+    let outer = attaching("angle=\"degree\" eulerseq=\"xyz\"", "h.xml", bodies, "");
     let inner = "<mujoco><compiler angle=\"radian\" eulerseq=\"zyx\"/><worldbody><body name=\"h\">\
                  <site name=\"s\" euler=\"0.3 0.5 0.7\"/></body></worldbody></mujoco>";
-    let (tree, _) = robot(&[("a.xml", outer), ("h.xml", inner)]).expect("it is valid");
+    let (tree, _) = robot(&[("a.xml", &outer), ("h.xml", inner)]).expect("it is valid");
     let found = joint(&tree, "p_s_fixed").origin.rotation;
     let expected = Quaternion::new(0.91263, 0.29378, 0.27944, 0.05213);
     assert!(found.angle_to(&UnitQuaternion::from_quaternion(expected)) < 1e-4);
@@ -378,18 +382,8 @@ fn attached_angles_are_those_of_their_file() {
 #[test]
 fn large_meshes_are_read_once() {
     let start = std::time::Instant::now();
-    let n = 30_000;
-    let points: Vec<String> = (0..n)
-        .map(|idx| {
-            let z = 1.0 - 2.0 * (f64::from(idx) + 0.5) / f64::from(n);
-            let (across, angle) = ((1.0 - z * z).sqrt(), 2.399_963 * f64::from(idx));
-            format!(
-                "{:.6} {:.6} {z:.6}",
-                across * angle.cos(),
-                across * angle.sin()
-            )
-        })
-        .collect();
+    let words = |[x, y, z]: [f64; 3]| format!("{x:.6} {y:.6} {z:.6}");
+    let points: Vec<String> = ball(30_000).into_iter().map(words).collect();
     let asset = format!(
         "<asset><mesh name=\"m\" inertia=\"convex\" vertex=\"{}\"/></asset>",
         points.join(" ")
@@ -535,4 +529,257 @@ fn features_that_are_not_simulated_are_reported() {
     let (_, said) =
         text(&part("", ""), "<visual><x/></visual><size nconmax=\"9\"/>").expect("it is valid");
     assert!(said.is_empty(), "{said}");
+}
+
+/// A few lines ask for billions of bodies, of files, or of attached models.
+#[test]
+fn models_that_explode_are_refused_at_once() {
+    let said = |files: &[(&str, &str)]| {
+        let start = std::time::Instant::now();
+        let said = tree_of(files).expect_err("it is far too large");
+        assert!(said.contains("W055"), "{said}");
+        assert!(said.matches("error").count() <= 2, "{said}");
+        assert!(start.elapsed().as_secs_f64() < 5.0, "{:?}", start.elapsed());
+        said
+    };
+    let nested = |open: &str, close: &str, n: usize| {
+        let inside = "<geom size=\"0.1\"/>";
+        let body = format!("{}{inside}{}", open.repeat(n), close.repeat(n));
+        format!("<mujoco><worldbody>{body}</worldbody></mujoco>")
+    };
+    let copies = "<replicate count=\"1000\">";
+    let bodies = nested(&format!("{copies}<body>"), "</body></replicate>", 3);
+    assert!(said(&[("a.xml", &bodies)]).contains("more than 1000 bodies"));
+    let geoms = nested(copies, "</replicate>", 5);
+    assert!(said(&[("a.xml", &geoms)]).contains("more than 10000 elements"));
+    let frames = nested("<frame>", "</frame>", 900);
+    assert!(said(&[("a.xml", &frames)]).contains("frames in each other"));
+    said(&[("a.xml", &nested("<body>", "</body>", 4_000))]);
+
+    let include = |n: usize| {
+        let twice = format!("<include file=\"{}.xml\"/>", n + 1).repeat(8);
+        (format!("{n}.xml"), format!("<mujoco>{twice}</mujoco>"))
+    };
+    let mut files: Vec<(String, String)> = (0..7).map(include).collect();
+    files.push((
+        "7.xml".to_owned(),
+        "<mujoco><worldbody/></mujoco>".to_owned(),
+    ));
+    let of = |files: &[(String, String)]| -> String {
+        let files: Vec<(&str, &str)> = files
+            .iter()
+            .map(|(name, text)| (name.as_str(), text.as_str()))
+            .collect();
+        said(&files)
+    };
+    assert!(of(&files).contains("more than 1000 files"));
+
+    let attach = |n: usize| {
+        let asset = format!("<asset><model name=\"m\" file=\"{}.xml\"/></asset>", n + 1);
+        let bodies: String = (0..8)
+            .map(|idx| format!("<frame><attach model=\"m\" prefix=\"{idx}_\"/></frame>"))
+            .collect();
+        let text = format!("<mujoco>{asset}<worldbody>{bodies}</worldbody></mujoco>");
+        (format!("{n}.xml"), text)
+    };
+    let mut files: Vec<(String, String)> = (0..7).map(attach).collect();
+    files.push((
+        "7.xml".to_owned(),
+        "<mujoco><worldbody/></mujoco>".to_owned(),
+    ));
+    assert!(of(&files).contains("more than 1000 files"));
+    files[7].1 = "<mujoco><worldbody><body/></worldbody></mujoco>".to_owned();
+    of(&files);
+}
+
+/// The mass of a link.
+fn kg(tree: &ModelTree, link: &str) -> f64 {
+    let link = tree.link(link).expect("it has the link");
+    link.inertial.as_ref().map_or(0.0, |inertial| inertial.kg)
+}
+
+const BALL: &str = "<geom size=\"0.1\"/>";
+
+/// MuJoCo leaves out the contacts of pairs that the file excludes, and of geoms whose masks
+/// don't meet.
+#[test]
+fn bodies_that_never_collide_are_named() {
+    let bodies = format!(
+        "<body name=\"a\">{BALL}<body name=\"b\">{BALL}</body></body><body name=\"c\">{BALL}</body>\
+         <body name=\"d\"><geom size=\"0.1\" contype=\"2\" conaffinity=\"4\"/></body>"
+    );
+    let more = "<contact><exclude body1=\"c\" body2=\"a\"/></contact>";
+    let tree = tree(&bodies, more).expect("it is valid");
+    let pairs = [["a", "c"], ["a", "d"], ["b", "d"], ["c", "d"]];
+    assert_eq!(tree.passing, pairs.map(|pair| pair.map(str::to_owned)));
+}
+
+/// Names of bodies and joints don't exclude each other; only a whole robot may move freely;
+/// `ref` is the position at which the body is where the file puts it.
+#[test]
+fn joints_keep_their_names_and_positions() {
+    let bodies = format!(
+        "<body name=\"base\"><freejoint/>{BALL}<body name=\"jaw\" pos=\"0 0 1\">\
+         <joint name=\"jaw\" axis=\"1 0 0\" ref=\"0.5\" range=\"0 1\"/>{BALL}</body></body>"
+    );
+    let tree = tree(&bodies, "").expect("it is valid");
+    let base = tree.joint("base_free").expect("it moves freely");
+    assert_eq!(base.motion, TreeMotion::Floating);
+    let jaw = tree.joint("jaw").expect("it has a jaw");
+    let roll_rad = jaw.origin.rotation.euler_angles().0;
+    assert!((roll_rad + 0.5).abs() < 1e-9, "{roll_rad}");
+}
+
+/// The robot would lack a part, with no warning.
+#[test]
+fn bodies_of_unknown_models_are_refused() {
+    let said = tree(
+        "<body name=\"a\"><attach model=\"hand\" body=\"palm\" prefix=\"h_\"/></body>",
+        "",
+    );
+    let said = said.expect_err("a hand is missing");
+    assert!(
+        said.contains("W035") && said.contains("to attach"),
+        "{said}"
+    );
+}
+
+/// Frames move the joints, geoms and bodies in them; a second `<worldbody>` counts as the
+/// first; copies are numbered and each moves on from the one before it.
+#[test]
+fn frames_copies_and_further_worlds_are_tree() {
+    let bodies = format!(
+        "<body name=\"a\"><frame pos=\"0 0 1\" euler=\"0 0 1.5707963267948966\">\
+         <joint name=\"turn\" axis=\"1 0 0\" pos=\"0.5 0 0\"/>{BALL}<body name=\"b\" pos=\"1 0 0\">{BALL}</body>\
+         </frame></body></worldbody><worldbody><replicate count=\"12\" offset=\"0.5 0 0\" sep=\"_\">\
+         <body name=\"c\" pos=\"0 0 2\">{BALL}</body></replicate>"
+    );
+    let tree = tree(&bodies, "").expect("it is valid");
+    let near = |at: Isometry3<f64>, expected: [f64; 3]| {
+        let off = (at.translation.vector - Vector3::from(expected)).norm();
+        assert!(off < 1e-9, "{at} instead of {expected:?}");
+    };
+    let turn = tree.joint("turn").expect("it has the joint");
+    near(turn.origin, [0.0, 0.5, 1.0]);
+    assert!((turn.axis - Vector3::y()).norm() < 1e-9);
+    let geom = &tree.link("a").expect("it has the body").solids[0];
+    near(geom.pose, [0.0, -0.5, 0.0]);
+    near(
+        tree.joint("b_fixed").expect("it is fixed").origin,
+        [0.0, 0.5, 0.0],
+    );
+    near(
+        tree.joint("c_11_fixed").expect("it is a copy").origin,
+        [5.5, 0.0, 2.0],
+    );
+    assert!(tree.link("c_12").is_none());
+}
+
+/// The masses of geoms by their own densities, of those that don't collide too, but for other
+/// groups; `<general>` defaults of forces reach `<position>`.
+#[test]
+fn masses_and_forces_have_their_defaults() {
+    let geoms = "<geom type=\"box\" size=\"0.05 0.05 0.05\" density=\"500\"/>\
+                 <geom type=\"box\" size=\"0.05 0.05 0.05\" mass=\"2\" contype=\"0\" conaffinity=\"0\"/>\
+                 <geom type=\"box\" size=\"0.05 0.05 0.05\" group=\"4\"/>";
+    let bodies = format!("<body name=\"a\"><joint name=\"j\"/>{geoms}</body>");
+    let more = "<compiler inertiagrouprange=\"0 3\"/>\
+                <default><default class=\"weak\"><general forcerange=\"-4 4\"/></default></default>\
+                <actuator><position class=\"weak\" joint=\"j\"/></actuator>";
+    let tree = tree(&bodies, more).expect("it is valid");
+    assert!((kg(&tree, "a") - 2.5).abs() < 1e-9);
+    assert_eq!(tree.joint("j").map(|joint| joint.effort), Some(4.0));
+}
+
+/// The gain and the bias of a class of servos reach `<general>`: its signal is a position, and
+/// not a force.
+#[test]
+fn an_actuator_has_the_kind_of_its_defaults() {
+    let bodies = "<body name=\"a\"><joint name=\"j\"/><geom type=\"sphere\" size=\"0.1\"/></body>";
+    let effort = |defaults: &str| {
+        let more = format!(
+            "<default><default class=\"c\">{defaults}</default></default>\
+             <actuator><general class=\"c\" joint=\"j\" ctrlrange=\"-0.5 0.5\" gear=\"2\"/></actuator>"
+        );
+        let tree = tree(bodies, &more).expect("it is valid");
+        tree.joint("j").map(|joint| joint.effort)
+    };
+    let servo = effort("<position kp=\"500\" forcerange=\"-3 3\"/>");
+    assert_eq!(servo, Some(6.0));
+    assert_eq!(effort("<motor forcerange=\"-3 3\"/>"), Some(1.0));
+    assert_eq!(effort("<position kp=\"9\"/><motor/>"), Some(1.0));
+}
+
+/// Bodies without a mass are raised to the least one; an attached model is weighed by its own
+/// rules alone, but the mass of the whole is that of all bodies. (As in MuJoCo 3.3.1.)
+#[test]
+fn masses_follow_the_rules_of_their_own_file() {
+    let arm = |rules: &str| {
+        let bodies = "<body name=\"a\"><joint/><geom size=\"0.05\"/><body name=\"empty\"><site name=\"s\"/></body>\
+                      <frame><attach model=\"h\" body=\"h\" prefix=\"p_\"/></frame></body>";
+        attaching(rules, "h.xml", bodies, "")
+    };
+    let hand = |rules: &str| {
+        format!(
+            "<mujoco><compiler {rules}/><worldbody><body name=\"h\"><joint/><geom size=\"0.01\"/></body>\
+             </worldbody></mujoco>"
+        )
+    };
+    for (of_arm, of_hand, masses) in [
+        ("", "", [FRAC_PI_6, 0.0, 0.004_189]),
+        (
+            "",
+            "boundmass=\"3\" boundinertia=\"0.3\"",
+            [FRAC_PI_6, 0.0, 3.0],
+        ),
+        ("boundmass=\"7\"", "boundmass=\"3\"", [7.0, 7.0, 3.0]),
+        ("boundmass=\"7\"", "", [7.0, 7.0, 0.004_189]),
+        ("", "settotalmass=\"5\"", [FRAC_PI_6, 0.0, 0.004_189]),
+        (
+            "settotalmass=\"9\"",
+            "settotalmass=\"5\"",
+            [8.928_571, 0.0, 0.071_429],
+        ),
+    ] {
+        let tree = tree_of(&[("a.xml", &arm(of_arm)), ("h.xml", &hand(of_hand))]);
+        let tree = tree.expect("it is valid");
+        for (link, expected) in ["a", "empty", "p_h"].into_iter().zip(masses) {
+            let found = kg(&tree, link);
+            assert!(
+                (found - expected).abs() < 1e-5,
+                "{link}: {found}, {of_arm}, {of_hand}"
+            );
+        }
+        assert!(tree.link("s").is_some_and(|site| site.inertial.is_none()));
+    }
+    let said = tree_of(&[("a.xml", &hand("inertiafromgeom=\"false\""))]);
+    assert!(said.is_err_and(|said| said.contains("moves and has no mass")));
+    let tree = tree_of(&[("a.xml", &hand("inertiafromgeom=\"false\" boundmass=\"2\""))]);
+    assert!((kg(&tree.expect("it is valid"), "h") - 2.0).abs() < 1e-9);
+}
+
+/// A box between two points is as deep as it is wide, and a mesh of vertices alone is their
+/// hull.
+#[test]
+fn shapes_are_as_mujoco_has_them() {
+    let bodies = "<body name=\"a\"><geom type=\"box\" size=\"0.02\" fromto=\"0 0 0 0 0 0.12\"/></body>\
+                  <body name=\"b\"><geom type=\"mesh\" mesh=\"m\" density=\"100\"/></body>\
+                  <body name=\"c\"><geom type=\"box\" mesh=\"m\"/></body>";
+    let more = "<asset><mesh name=\"m\" vertex=\"0 0 0 1 0 0 0 2 0 1 2 0 0 0 3 1 0 3 0 2 3 1 2 3\"/></asset>";
+    let tree = tree(bodies, more).expect("it is valid");
+    let size = |link: &str| {
+        let shape = tree.link(link)?.solids[0].geometry.solid()?;
+        match shape {
+            Shape::Box { size } => Some(size),
+            _ => None,
+        }
+    };
+    let near = |found: Option<[f64; 3]>, expected: [f64; 3]| {
+        let found = found.expect("it is a box");
+        let off = (Vector3::from(found) - Vector3::from(expected)).norm();
+        assert!(off < 1e-9, "{found:?}");
+    };
+    near(size("a"), [0.04, 0.04, 0.12]);
+    near(size("c"), [1.0, 2.0, 3.0]);
+    assert!((kg(&tree, "b") - 600.0).abs() < 1e-9);
 }

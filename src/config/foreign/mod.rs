@@ -29,6 +29,7 @@ mod mjcf_compiler;
 mod mjcf_couplings;
 mod mjcf_elements;
 mod mjcf_geoms;
+mod mjcf_graft;
 mod mjcf_loops;
 mod mjcf_masks;
 #[cfg(test)]
@@ -38,8 +39,6 @@ mod nested;
 pub(crate) mod robot;
 pub(crate) mod robot_inertia;
 pub(crate) mod robot_shapes;
-
-mod geom_mass;
 mod sdf;
 mod sdf_ends;
 mod sdf_inertial;
@@ -55,9 +54,11 @@ mod sdf_robot_model;
 mod sdf_robot_tests;
 mod sdf_robot_tree;
 mod sdf_surface;
-mod solids;
+mod solid_mass;
 #[cfg(test)]
 mod stated_tests;
+#[cfg(test)]
+mod test_files;
 mod tree_checks;
 mod tree_object;
 mod urdf;

@@ -23,7 +23,7 @@ use actcheck_base::Span;
 use actcheck_data::PartJoint;
 
 /// Of the elements that are read, `allow_auto_disable`, `name` and `origin` have no effect.
-const MODEL: Children = Children {
+pub(super) const MODEL: Children = Children {
     read: &[
         "link",
         "joint",
@@ -381,6 +381,7 @@ impl Tree {
         }
         let others = match n_links {
             1 => String::new(),
+            2 => " and the link joined to it".to_owned(),
             _ => format!(" and the {} links joined to it", n_links - 1),
         };
         let message = format!("no joint connects `{name}`{others} to the other links");

@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::foreign::geometry::Shapes;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::robot_inertia::{self, Mend};
-use crate::foreign::urdf_tree::{self, UrdfTree};
+use crate::foreign::urdf_tree::{self, URDF_ROOT, UrdfTree};
 use crate::foreign::xml::{self, Reader};
 use crate::foreign::{mjcf, robot_shapes, root_name, sdf_robot, tree_checks, urdf_writer};
 use actcheck_base::{Diagnostic, Diagnostics, Source};
@@ -85,20 +85,13 @@ fn urdf(source: &Source, found: &mut Diagnostics) -> Result<UrdfTree, Diagnostic
     let document = xml::parse_model(source, &source.text)?;
     let mut reader = Reader::new(source);
     let root = document.root_element();
-    let read = if root.tag_name().name() == "robot" {
-        urdf_tree::read(root, &mut reader)
-    } else {
-        let message = format!(
-            "the root is `<{}>` instead of `<robot>`",
-            root.tag_name().name()
-        );
-        let help = "a URDF file begins with `<robot name=\"…\">`";
-        reader.error("W032", root, message, help);
-        UrdfTree {
+    let read = match reader.root(root, "robot", URDF_ROOT) {
+        Some(()) => urdf_tree::read(root, &mut reader),
+        None => UrdfTree {
             tree: ModelTree::default(),
             is_whole: false,
             faults_of_visuals: BTreeMap::new(),
-        }
+        },
     };
     found.extend(reader.found);
     Ok(read)

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
 use crate::foreign::body::is_possible;
+use crate::foreign::solid_mass::SolidMass;
 use crate::foreign::{root_name, xml};
 use actcheck_base::{Diagnostic, Diagnostics, Span};
 use actcheck_data::{
@@ -103,21 +104,17 @@ fn masses_of_body<'a>(tree: &'a ModelTree, moved: &'a str) -> Vec<LinkMass<'a>> 
     masses
 }
 
-/// The inertia tensor of all masses about their common centre, by the parallel axis theorem.
+/// The inertia tensor of all masses about their common centre.
 fn together(masses: &[LinkMass]) -> Matrix3<f64> {
-    let total: f64 = masses.iter().map(|mass| mass.stated.kg).sum();
-    let com = masses
-        .iter()
-        .map(|mass| mass.at.translation.vector * mass.stated.kg)
-        .sum::<Vector3<f64>>()
-        / total;
-    let about = |mass: &LinkMass| {
-        let arm = mass.at.translation.vector - com;
-        let turned = mass.at.rotation.to_rotation_matrix();
-        let own = turned.matrix() * mass.stated.about_com * turned.matrix().transpose();
-        own + (Matrix3::identity() * arm.norm_squared() - arm * arm.transpose()) * mass.stated.kg
-    };
-    masses.iter().map(about).sum()
+    let in_body = masses.iter().map(|mass| {
+        let own = SolidMass {
+            kg: mass.stated.kg,
+            com: Vector3::zeros(),
+            about_com: mass.stated.about_com,
+        };
+        own.moved(&mass.at)
+    });
+    SolidMass::together(&in_body.collect::<Vec<_>>()).about_com
 }
 
 /// Reports one link's moments, with those of a box around its shape. `can_mend`: they are those of a

@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::foreign::body::{Role, SdfModel};
-use crate::foreign::frames::Included;
 use crate::foreign::geometry::Shapes;
 use crate::foreign::inclusions::Inclusions;
 use crate::foreign::lenient::repaired;
@@ -60,17 +59,9 @@ pub(crate) fn read_included(
     read_with(source, shapes, |model, shapes, reader| {
         let is_static = is_static(model, reader);
         let tree = Tree::read(model, role, fixed || is_static, shapes, reader);
-        let (stated, placement) = sdf_pose::placement(model, reader)?;
-        let name = model.attribute("name").unwrap_or_default().to_owned();
         Some(SubModel {
             tree,
-            place: Included {
-                name,
-                stated,
-                placement,
-                merged: false,
-                frames: sdf_pose::frames(model, reader),
-            },
+            place: sdf_pose::place(model, reader)?,
             is_static,
             digest: shapes.digest.clone().finish(),
         })
@@ -127,19 +118,11 @@ pub(super) fn root_model<'a>(root: Node<'a>, reader: &mut Reader) -> Option<Node
 
 /// Returns `Some` if the root is SDF of a supported version; otherwise reports W032.
 pub(crate) fn check_version(root: Node, reader: &mut Reader) -> Option<()> {
-    if root.tag_name().name() != "sdf" {
-        let message = format!(
-            "the root is `<{}>` instead of `<sdf>`",
-            root.tag_name().name()
-        );
-        reader.error(
-            "W032",
-            root,
-            message,
-            "an SDF file begins with `<sdf version=\"1.6\">`",
-        );
-        return None;
-    }
+    reader.root(
+        root,
+        "sdf",
+        "an SDF file begins with `<sdf version=\"1.6\">`",
+    )?;
     let version = reader.attribute(root, "version")?;
     let minor = version
         .strip_prefix("1.")

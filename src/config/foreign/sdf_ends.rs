@@ -33,8 +33,8 @@ impl JointEnd {
 }
 
 impl WrittenPart<'_> {
-    /// Returns the link that an end of a joint names, itself or by a frame. `links` are the names of
-    /// all links. Reports W051, and returns `None`, if there is no such link.
+    /// Returns the link that an end of a joint names, directly or by a frame of the link. `links` are
+    /// the names of all links. If the model lacks the link, reports W051 and returns `None`.
     pub(crate) fn end(&self, which: &str, links: &[&str], reader: &mut Reader) -> Option<JointEnd> {
         let element = reader.required(self.node, which)?;
         let named = xml::text(element);
@@ -53,7 +53,12 @@ impl WrittenPart<'_> {
             return Some(JointEnd::Link(idx));
         }
         let help = did_you_mean(named, links.iter().copied());
-        reader.error("W051", element, format!("there is no link `{named}`"), help);
+        reader.error(
+            "W051",
+            element,
+            format!("the model has no link `{named}`"),
+            help,
+        );
         None
     }
 

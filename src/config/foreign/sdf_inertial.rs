@@ -4,8 +4,9 @@ use nalgebra::{Isometry3, Matrix3};
 
 use crate::foreign::body::{Mass, is_possible};
 use crate::foreign::elements::Children;
+use crate::foreign::geometry::{Primitive, kind_of, sdf_primitive};
 use crate::foreign::sdf_pose::pose;
-use crate::foreign::solids::SolidMass;
+use crate::foreign::solid_mass::SolidMass;
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_data::Shape;
 
@@ -58,10 +59,10 @@ pub(crate) fn read(
 fn of_solids(solids: &[CollisionSolid], kg: f64) -> Option<Matrix3<f64>> {
     let masses = solids
         .iter()
-        .map(|solid| Some(SolidMass::of(&solid.shape)?.placed(&solid.at, 1.0)))
+        .map(|solid| Some(SolidMass::of_shape(&solid.shape)?.moved(&solid.at)))
         .collect::<Option<Vec<SolidMass>>>()?;
-    let whole = SolidMass::together(&masses)?;
-    Some(whole.about_centre * (kg / whole.volume))
+    let whole = SolidMass::together(&masses);
+    (whole.kg > 0.0).then(|| whole.about_com * (kg / whole.kg))
 }
 
 /// Warns of densities in a link whose mass is not computed from them.
@@ -97,7 +98,11 @@ fn stated(
             about_com: Some(Matrix3::zeros()),
         });
     }
-    let moments = xml::child(inertial, "inertia").and_then(|inertia| read_inertia(inertia, reader));
+    let moments = xml::child(inertial, "inertia").and_then(|inertia| {
+        warn_of_missing_moments(inertia, reader);
+        let moments = moments(inertia, reader)?;
+        possible(moments, inertia, reader)
+    });
     let turn = at.rotation.to_rotation_matrix();
     let about_com = moments.map(|moments| turn.matrix() * moments * turn.matrix().transpose());
     Some(Mass {
@@ -108,7 +113,7 @@ fn stated(
 }
 
 /// Warns of moments of inertia that a link does not state (W036): SDF has defaults for them.
-pub(super) fn warn_of_missing_moments(inertia: Node, reader: &mut Reader) {
+fn warn_of_missing_moments(inertia: Node, reader: &mut Reader) {
     let missing = ["ixx", "iyy", "izz"].map(|name| (name, xml::child(inertia, name)));
     let missing: Vec<String> = missing
         .iter()
@@ -125,16 +130,16 @@ pub(super) fn warn_of_missing_moments(inertia: Node, reader: &mut Reader) {
     }
 }
 
-fn read_inertia(inertia: Node, reader: &mut Reader) -> Option<Matrix3<f64>> {
-    warn_of_missing_moments(inertia, reader);
+/// Reads moments of inertia; those that are missing have the defaults of SDF. Returns `None` after a
+/// fault.
+pub(super) fn moments(inertia: Node, reader: &mut Reader) -> Option<Matrix3<f64>> {
     let mut entry = |name: &str, default| match xml::child(inertia, name) {
         Some(node) => reader.number(node, Bound::Finite),
         None => Some(default),
     };
     let (xx, yy, zz) = (entry("ixx", 1.0)?, entry("iyy", 1.0)?, entry("izz", 1.0)?);
     let (xy, xz, yz) = (entry("ixy", 0.0)?, entry("ixz", 0.0)?, entry("iyz", 0.0)?);
-    let moments = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-    possible(moments, inertia, reader)
+    Some(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
 }
 
 /// Returns the moments of inertia if they are possible. Otherwise warns (W036) and returns `None`:
@@ -178,9 +183,10 @@ pub(super) fn computed(
             reader.error("W035", solid.collision, message, help);
             return None;
         };
-        masses.push(unit.placed(&solid.at, density));
+        masses.push(unit.times(density).moved(&solid.at));
     }
-    let Some(whole) = SolidMass::together(&masses) else {
+    let whole = SolidMass::together(&masses);
+    if whole.kg <= 0.0 {
         let message = "the mass of a link without a `<collision>` can't be computed".to_owned();
         reader.error(
             "W033",
@@ -189,35 +195,27 @@ pub(super) fn computed(
             "add a `<collision>`, or state the `<mass>`",
         );
         return None;
-    };
+    }
     let kg = match xml::child(inertial, "mass") {
         Some(mass) => reader.number(mass, Bound::Positive)?,
-        None => whole.volume,
+        None => whole.kg,
     };
     Some(Mass {
         kg,
-        com: whole.centre,
-        about_com: Some(whole.about_centre * (kg / whole.volume)),
+        com: whole.com,
+        about_com: Some(whole.about_com * (kg / whole.kg)),
     })
 }
 
-/// Returns the exact solid of a collision; those that are simulated as meshes have less volume.
+/// Returns the exact solid of a collision, with a density of 1; those that are simulated as meshes
+/// have less volume.
 fn of_geometry(solid: &CollisionSolid, reader: &mut Reader) -> Option<SolidMass> {
-    let geometry = xml::child(solid.collision, "geometry")?;
-    let parameter = |kind: Node, name: &str, reader: &mut Reader| {
-        reader.number(xml::child(kind, name)?, Bound::Length)
-    };
-    if let Some(ellipsoid) = xml::child(geometry, "ellipsoid") {
-        let radii = xml::child(ellipsoid, "radii")?;
-        let radii = reader.numbers(radii, xml::text(radii), Bound::Length)?;
-        return Some(SolidMass::of_ellipsoid(radii));
+    let kind = kind_of(xml::child(solid.collision, "geometry")?, reader)?;
+    if kind.tag_name().name() == "mesh" {
+        return SolidMass::of_shape(&solid.shape);
     }
-    if let Some(cone) = xml::child(geometry, "cone") {
-        let (radius, length) = (
-            parameter(cone, "radius", reader)?,
-            parameter(cone, "length", reader)?,
-        );
-        return Some(SolidMass::of_cone(radius, length));
-    }
-    SolidMass::of(&solid.shape)
+    Some(match sdf_primitive(kind, reader)? {
+        Primitive::Geometry(geometry) => SolidMass::of_primitive(&geometry),
+        Primitive::Cone { radius, length } => SolidMass::of_cone(radius, length),
+    })
 }

@@ -7,24 +7,27 @@ use crate::foreign::sdf_pose::{frame, pose};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_data::PartJoint;
 
-/// Limits beyond this are none. Units: metres or radians.
+/// Larger limits mean that the joint is unlimited. Units: metres or radians.
 const UNLIMITED: f64 = 1e6;
 /// The minor version of SDF 1 from which axes are in the frame of their joint, no longer in that of
 /// the model.
 const OWN_FRAME: u32 = 5;
 
 pub(crate) const JOINT: Children = Children {
-    read: &["parent", "child", "pose", "axis", "axis2", "origin"],
-    // The limits and damping in `<physics>` are those of other solvers, with their own defaults.
+    read: &["parent", "child", "pose", "axis", "origin"],
+    // The limits and damping in `<physics>` are those of other solvers, with their own defaults;
+    // a second axis, gears and screws belong to types of joints that are errors.
     harmless: &[
         "sensor",
         "physics",
+        "axis2",
         "gearbox_ratio",
         "gearbox_reference_body",
         "thread_pitch",
         "screw_thread_pitch",
     ],
-    refused: &[],
+    // It belongs into `<axis>`.
+    refused: &["mimic"],
 };
 const AXIS: Children = Children {
     read: &[
@@ -47,7 +50,7 @@ const DYNAMICS: Children = Children {
     harmless: &[],
     refused: &[],
 };
-/// There is no motor whose effort and speed could have limits.
+/// The motors of robots have the limits `effort` and `velocity`; the joints of objects have no motors.
 const LIMIT: Children = Children {
     read: &[
         "lower",
@@ -165,7 +168,7 @@ pub(crate) fn motion(
     })
 }
 
-/// Reads a limit: `Some(None)` if there is none, `None` after a fault.
+/// Reads a limit: `Some(None)` if the joint has none, `None` after a fault.
 #[expect(clippy::option_option, reason = "a fault and a missing limit differ")]
 pub(super) fn limit(limits: Option<Node>, name: &str, reader: &mut Reader) -> Option<Option<f64>> {
     let Some(node) = limits.and_then(|limits| xml::child(limits, name)) else {

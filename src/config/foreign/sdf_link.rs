@@ -22,7 +22,7 @@ pub(super) const LINK: Children = Children {
         "gravity",
         "kinematic",
         "velocity_decay",
-        // Its model reads `self_collide`; there is no wind.
+        // The reader of models reads `self_collide`; the simulation has no wind.
         "self_collide",
         "enable_wind",
         "must_be_base_link",

@@ -13,6 +13,7 @@ use actcheck_base::did_you_mean;
 const LONGEST: usize = 64;
 /// The elements that have a frame of their own.
 const WITH_FRAME: [&str; 5] = ["link", "joint", "frame", "model", "include"];
+
 /// Reads the pose of an element; the identity if it has none. It is in the frame in which SDF reads
 /// a pose that names none: that of the parent element or, for a joint, that of its child link. Of a
 /// model and an `<include>`, this is the pose of the model's own frame, whichever frame of it the
@@ -36,27 +37,27 @@ pub(crate) fn pose(node: Node, reader: &mut Reader) -> Option<Isometry3<f64>> {
     Some(usual.inverse() * in_model(node, 0, reader)?)
 }
 
-/// Reads the `<pose>` of a model, which is that of its placement frame, and the pose of this frame
-/// in that of the model. Returns `None` after it has reported a fault.
-pub(crate) fn placement(
-    model: Node,
-    reader: &mut Reader,
-) -> Option<(Isometry3<f64>, Isometry3<f64>)> {
-    Some((
-        stated(model, 0, reader)?,
-        placement_frame(model, 0, reader)?,
-    ))
+/// Returns the pose and the frames of a model, for a file that includes it. Returns `None` after it has
+/// reported a fault.
+pub(crate) fn place(model: Node, reader: &mut Reader) -> Option<Included> {
+    Some(Included {
+        name: model.attribute("name").unwrap_or_default().to_owned(),
+        stated: stated(model, 0, reader)?,
+        placement: placement_frame(model, 0, reader)?,
+        merged: false,
+        frames: frames(model, reader),
+    })
 }
 
-/// Returns a frame of the model that contains an element, in the frame of that model. Reports W035,
-/// and returns `None`, if there is no such frame.
+/// Returns a frame of the model that contains an element, in the frame of that model. If the
+/// model lacks the frame, reports W035 and returns `None`.
 pub(crate) fn frame(node: Node, name: &str, reader: &mut Reader) -> Option<Isometry3<f64>> {
     named(scope(node), name, node, 0, reader)
 }
 
 /// Returns all frames of a model by name, with those of the models in it. Reports those that can't
 /// be resolved.
-pub(crate) fn frames(model: Node, reader: &mut Reader) -> BTreeMap<String, Frame> {
+fn frames(model: Node, reader: &mut Reader) -> BTreeMap<String, Frame> {
     let own = Frame {
         pose: Isometry3::identity(),
         link: canonical_link(model, 0, reader),
@@ -93,7 +94,7 @@ pub(crate) fn frames(model: Node, reader: &mut Reader) -> BTreeMap<String, Frame
 }
 
 /// Returns the name of the link that carries a frame of the model that contains an element; `None`
-/// if there is no such frame. Nothing is reported.
+/// if the model lacks the frame, which is not reported.
 pub(crate) fn carrier(node: Node, name: &str, reader: &Reader) -> Option<String> {
     link_of(scope(node), name, 0, reader)
 }
@@ -305,7 +306,8 @@ fn named(
         .filter_map(|child| name_of(child, reader))
         .collect();
     let help = did_you_mean(name, known.iter().map(String::as_str));
-    reader.error("W035", at, format!("there is no frame `{name}`"), help);
+    let message = format!("the {} has no frame `{name}`", model.tag_name().name());
+    reader.error("W035", at, message, help);
     None
 }
 

@@ -14,7 +14,7 @@ use crate::foreign::sdf_pose::{self, pose};
 use crate::foreign::sdf_robot_include::{SdfFile, Submodels};
 use crate::foreign::sdf_robot_model::{Group, RobotElements};
 use crate::foreign::sdf_robot_tree;
-use crate::foreign::world::ALWAYS_THERE;
+use crate::foreign::world::is_always_there;
 use crate::foreign::xml::{self, Node, Reader};
 use actcheck_base::{Diagnostics, Source};
 use actcheck_data::ModelTree;
@@ -108,7 +108,7 @@ fn robot(root: Node, file: &SdfFile, reader: &mut Reader) -> Option<(String, Gro
     let container = world.unwrap_or(root);
     let is_robot = |node: &Node| match node.tag_name().name() {
         "model" => true,
-        "include" => !is_always_there(*node),
+        "include" => xml::child(*node, "uri").is_none_or(|uri| !is_always_there(uri)),
         _ => false,
     };
     let mut candidates: Vec<Candidate> = container
@@ -173,14 +173,6 @@ fn robot(root: Node, file: &SdfFile, reader: &mut Reader) -> Option<(String, Gro
         group.rename(&format!("{name}::"));
     }
     Some((name, group))
-}
-
-/// Whether an `<include>` is that of the floor or the light.
-fn is_always_there(include: Node) -> bool {
-    let uri = xml::child(include, "uri").map_or("", xml::text);
-    let last = uri.trim_end_matches('/').rsplit('/').next();
-    let last = last.unwrap_or_default().to_lowercase().replace(' ', "_");
-    ALWAYS_THERE.contains(&last.as_str())
 }
 
 /// The models at the ends of a joint of a world.

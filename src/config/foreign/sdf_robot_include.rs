@@ -170,14 +170,7 @@ fn sdf(
         let mut elements = RobotElements::default();
         elements.models.read(model, file, &mut reader);
         elements.add_model(model, &Isometry3::identity(), "", &mut reader);
-        let (stated, placement) = sdf_pose::placement(model, &mut reader)?;
-        let place = Included {
-            name: model.attribute("name").unwrap_or_default().to_owned(),
-            stated,
-            placement,
-            merged: false,
-            frames: sdf_pose::frames(model, &mut reader),
-        };
+        let place = sdf_pose::place(model, &mut reader)?;
         Some(Submodel {
             group: elements.into_group(file, &mut reader),
             place,

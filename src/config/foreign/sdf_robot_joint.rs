@@ -14,21 +14,6 @@ const SLIDES_M: f64 = 10.0;
 /// Range of a turning joint with a limit at one end only. Unit: radians.
 const TURNS_RAD: f64 = 10.0 * TAU;
 
-const JOINT: Children = Children {
-    read: &["parent", "child", "pose", "axis", "origin"],
-    // The limits and damping in `<physics>` are those of other solvers, with their own defaults;
-    // the others belong to kinds of joints that are errors.
-    harmless: &[
-        "sensor",
-        "physics",
-        "axis2",
-        "gearbox_ratio",
-        "gearbox_reference_body",
-        "thread_pitch",
-        "screw_thread_pitch",
-    ],
-    refused: &["mimic"],
-};
 const AXIS: Children = Children {
     read: &[
         "xyz",
@@ -56,7 +41,7 @@ pub(crate) fn read(
     own: UnitQuaternion<f64>,
     reader: &mut Reader,
 ) -> Option<TreeJoint> {
-    JOINT.check(joint, reader);
+    sdf_joint::JOINT.check(joint, reader);
     reader.attribute(joint, "type")?;
     let axis = xml::child(joint, "axis");
     let mimic_node = axis.and_then(|axis| xml::child(axis, "mimic"));

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Matrix3};
 
 use crate::foreign::body::Role;
 use crate::foreign::elements::{Children, refuse_switch};
-use crate::foreign::geometry::{KINDS, Shapes, cone, kind_of};
+use crate::foreign::geometry::{Primitive, Shapes, check_scale, cone, kind_of, sdf_primitive};
 use crate::foreign::sdf_inertial::{self, CollisionSolid, INERTIAL};
 use crate::foreign::sdf_link::{COLLISION, LINK, check_drag};
 use crate::foreign::sdf_pose::pose;
@@ -113,21 +113,21 @@ fn solid(
     if kind.tag_name().name() == "empty" {
         return None;
     }
-    let geometry = match kind.tag_name().name() {
-        "cone" => {
-            let cone = cone(
-                number(kind, "radius", reader)?,
-                number(kind, "length", reader)?,
-            )?;
-            let name = node.attribute("name").unwrap_or_default();
-            let name = format!("{link} {name} ({})", meshes.len());
-            meshes.insert(name.clone(), cone);
-            TreeGeometry::Mesh {
-                file: name,
-                scale: [1.0; 3],
+    let geometry = if kind.tag_name().name() == "mesh" {
+        mesh(kind, file, reader)?
+    } else {
+        match sdf_primitive(kind, reader)? {
+            Primitive::Geometry(geometry) => geometry,
+            Primitive::Cone { radius, length } => {
+                let name = node.attribute("name").unwrap_or_default();
+                let name = format!("{link} {name} ({})", meshes.len());
+                meshes.insert(name.clone(), cone(radius, length)?);
+                TreeGeometry::Mesh {
+                    file: name,
+                    scale: [1.0; 3],
+                }
             }
         }
-        _ => shape(kind, file, reader)?,
     };
     Some(TreeSolid {
         pose: pose?,
@@ -138,52 +138,18 @@ fn solid(
     })
 }
 
-fn number(kind: Node, name: &str, reader: &mut Reader) -> Option<f64> {
-    let node = reader.required(kind, name)?;
-    reader.number(node, Bound::Length)
-}
-
-fn three(kind: Node, name: &str, reader: &mut Reader) -> Option<[f64; 3]> {
-    let node = reader.required(kind, name)?;
-    reader.numbers(node, xml::text(node), Bound::Length)
-}
-
-fn shape(kind: Node, file: &SdfFile, reader: &mut Reader) -> Option<TreeGeometry> {
-    match kind.tag_name().name() {
-        "sphere" => number(kind, "radius", reader).map(|radius| TreeGeometry::Sphere { radius }),
-        "box" => three(kind, "size", reader).map(|size| TreeGeometry::Box { size }),
-        "ellipsoid" => three(kind, "radii", reader).map(|radii| TreeGeometry::Ellipsoid { radii }),
-        round @ ("cylinder" | "capsule") => {
-            let [radius, length] = ["radius", "length"].map(|name| number(kind, name, reader));
-            let (radius, length) = (radius?, length?);
-            Some(match round {
-                "cylinder" => TreeGeometry::Cylinder { radius, length },
-                _ => TreeGeometry::Capsule { radius, length },
-            })
-        }
-        "mesh" => {
-            MESH.check(kind, reader);
-            let uri = reader.required(kind, "uri").map(xml::text)?;
-            let scale = match xml::child(kind, "scale") {
-                Some(scale) => reader.numbers(scale, xml::text(scale), Bound::Finite)?,
-                None => [1.0; 3],
-            };
-            if scale.contains(&0.0) {
-                let message = "the mesh's scale must not be 0".to_owned();
-                reader.error("W034", kind, message, "write 1 for the file's own size");
-                return None;
-            }
-            Some(TreeGeometry::Mesh {
-                file: file.mesh(uri),
-                scale,
-            })
-        }
-        other => {
-            let message = format!("the geometry `<{other}>` can't be part of a robot");
-            reader.error("W035", kind, message, KINDS);
-            None
-        }
-    }
+fn mesh(kind: Node, file: &SdfFile, reader: &mut Reader) -> Option<TreeGeometry> {
+    MESH.check(kind, reader);
+    let uri = reader.required(kind, "uri").map(xml::text)?;
+    let scale = match xml::child(kind, "scale") {
+        Some(scale) => reader.numbers(scale, xml::text(scale), Bound::Finite)?,
+        None => [1.0; 3],
+    };
+    check_scale(scale, &reader.place(kind), &mut reader.found)?;
+    Some(TreeGeometry::Mesh {
+        file: file.mesh(uri),
+        scale,
+    })
 }
 
 /// Reads the mass of a link, or computes it from the volumes of its collisions. Returns `None`
@@ -245,22 +211,10 @@ fn stated(inertial: Node, reader: &mut Reader) -> Option<TreeInertial> {
         None => USUAL_KG,
     };
     let inertia = xml::child(inertial, "inertia");
-    let mut about_com = Matrix3::identity();
-    for (row, column, name) in [
-        (0, 0, "ixx"),
-        (0, 1, "ixy"),
-        (0, 2, "ixz"),
-        (1, 1, "iyy"),
-        (1, 2, "iyz"),
-        (2, 2, "izz"),
-    ] {
-        let Some(written) = inertia.and_then(|inertia| xml::child(inertia, name)) else {
-            continue;
-        };
-        let value = reader.number(written, Bound::Finite)?;
-        about_com[(row, column)] = value;
-        about_com[(column, row)] = value;
-    }
+    let about_com = match inertia {
+        Some(inertia) => sdf_inertial::moments(inertia, reader)?,
+        None => Matrix3::identity(),
+    };
     Some(TreeInertial {
         pose,
         kg,

@@ -4,9 +4,8 @@ use std::collections::BTreeMap;
 
 use nalgebra::Isometry3;
 
-use crate::foreign::elements::Children;
 use crate::foreign::inclusions::check_size;
-use crate::foreign::nested::{refuse_static, warn_of_plugin};
+use crate::foreign::nested::{MODEL, refuse_static, warn_of_plugin};
 use crate::foreign::sdf::is_static;
 use crate::foreign::sdf_ends::{JointEnd, WrittenPart};
 use crate::foreign::sdf_pose::{self, pose};
@@ -15,29 +14,6 @@ use crate::foreign::xml::{self, Bound, Node, Reader};
 use crate::foreign::{sdf_robot_joint, sdf_robot_link};
 use actcheck_base::{Diagnostic, Diagnostics, did_you_mean};
 use actcheck_data::{Mesh, TreeJoint, TreeLink, TreeMimic, TreeMotion};
-
-/// Of the elements that are read, `allow_auto_disable`, `name` and `origin` have no effect.
-const MODEL: Children = Children {
-    read: &[
-        "link",
-        "joint",
-        "static",
-        "pose",
-        "frame",
-        "self_collide",
-        "allow_auto_disable",
-        "enable_wind",
-        "plugin",
-        "model",
-        "include",
-        "name",
-        "origin",
-        "placement_frame",
-    ],
-    // Grippers hold by friction here.
-    harmless: &["gripper"],
-    refused: &[],
-};
 
 /// Longest name of a link with those of the models around it: all pairs of links may be listed.
 const LONGEST_NAME: usize = 500;
@@ -49,7 +25,7 @@ pub(crate) struct LinkAt {
     pub(crate) at: Isometry3<f64>,
     /// The beginning of the names in its own model.
     pub(crate) model: String,
-    /// Whether its file says that it collides with others of its model.
+    /// Whether its file says that it collides with the other links of its model.
     pub(crate) collides: Option<bool>,
     /// Faults of shapes that are only seen.
     pub(crate) faults_of_visuals: Option<Diagnostics>,
@@ -141,7 +117,8 @@ impl Group {
         }
     }
 
-    /// Adds the pairs of colliding links of one model of which at least one collides with no other.
+    /// Adds the pairs of links of one model that pass through each other, because one of the two has
+    /// `<self_collide>` of false.
     /// Reports names that are too long (W055).
     fn add_passing(&mut self, reader: &mut Reader) {
         let longest = self.links.iter().max_by_key(|link| link.link.name.len());
@@ -266,6 +243,10 @@ impl<'a> RobotElements<'a> {
                     self.couplings.push(written(child));
                 }
                 "plugin" => warn_of_plugin(child, reader),
+                "gripper" => {
+                    let message = "`<gripper>` in `<model>` is ignored".to_owned();
+                    reader.warning("W036", child, message, "grippers hold by friction here");
+                }
                 _ => {}
             }
         }
@@ -412,7 +393,7 @@ fn couple(plugin: &WrittenPart, group: &mut Group, reader: &mut Reader) {
         None => {
             let known = group.joints.iter().map(|joint| joint.joint.name.as_str());
             let help = did_you_mean(&follower, known);
-            let message = format!("there is no joint `{follower}` to follow `{leader}`");
+            let message = format!("the model has no joint `{follower}` to follow `{leader}`");
             reader.error("W051", node, message, help);
         }
     }

@@ -80,7 +80,7 @@ fn check_mimic(
     let Some(leads) = joints.get(leader).filter(|leads| leads.motion.moves()) else {
         let known = joints.values().filter(|known| known.motion.moves());
         let help = did_you_mean(leader, known.map(|known| known.name.as_str()));
-        let message = format!("there is no movable joint `{leader}` to mimic");
+        let message = format!("the model has no movable joint `{leader}` to mimic");
         fault(
             found,
             Diagnostic::error("W051", message),

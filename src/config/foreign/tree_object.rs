@@ -223,7 +223,7 @@ fn read_link(
     let turned = pose.rotation.to_rotation_matrix();
     let about_com = turned.matrix() * stated.about_com * turned.matrix().transpose();
     let possible = is_possible(&about_com);
-    // Those that no file states are computed without a word.
+    // A file that states no moments gets no warning about them.
     let is_unstated = stated.moments_place.is_none() && stated.about_com == Matrix3::zeros();
     if !possible && !is_unstated {
         let message =

@@ -11,9 +11,10 @@ use crate::foreign::geometry::Shapes;
 use crate::foreign::lenient::repaired;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::sdf_surface::{refuse_self_collision, warn_of_usual_friction};
+use crate::foreign::tree_object;
 use crate::foreign::urdf_extra::{self, Contact, Extras};
+use crate::foreign::urdf_tree::{self, URDF_ROOT};
 use crate::foreign::xml::{self, Node, Reader};
-use crate::foreign::{tree_object, urdf_tree};
 use actcheck_base::{Diagnostics, Source, SourceSpan};
 use actcheck_data::{ModelTree, TreeJoint, TreeMotion};
 
@@ -33,24 +34,13 @@ pub(crate) fn read(
     shapes.digest.update(source.text.as_bytes());
     let root = document.root_element();
     let (mut body, mut frames) = (Body::default(), BTreeMap::new());
-    if root.tag_name().name() == "robot" {
+    if reader.root(root, "robot", URDF_ROOT).is_some() {
         (body, frames) = read_object(root, &mut shapes, &mut reader);
         if body.parts.is_empty() && !reader.found.has_errors() {
             let message = "the object has no solid shape: none of its links has a `<collision>`";
             let help = "give a link a `<collision>`; a `<visual>` does not collide";
             reader.error("W038", root, message.to_owned(), help);
         }
-    } else {
-        let message = format!(
-            "the root is `<{}>` instead of `<robot>`",
-            root.tag_name().name()
-        );
-        reader.error(
-            "W032",
-            root,
-            message,
-            "a URDF file begins with `<robot name=\"…\">`",
-        );
     }
     let found = reader.found;
     if found.has_errors() {

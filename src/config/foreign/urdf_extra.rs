@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use crate::foreign::body::Role;
 use crate::foreign::elements::{Children, refuse_switch, refuse_unless};
+use crate::foreign::sdf_link::check_drag;
 use crate::foreign::sdf_surface::{Surface, drake_friction, isotropic};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::Span;
@@ -35,7 +36,7 @@ pub(crate) const INERTIAL: Children = Children {
     harmless: &[],
     refused: &[],
 };
-/// There is no motor for the controllers and calibrations of a joint.
+/// Controllers and calibrations belong to motors, and the joints of objects have none.
 pub(crate) const JOINT: Children = Children {
     read: &["origin", "parent", "child", "axis", "limit", "dynamics"],
     harmless: &["safety_controller", "calibration"],
@@ -242,8 +243,7 @@ fn check_part(gazebo: Node, reader: &mut Reader) {
     let why = "there is no air drag";
     refuse_unless(gazebo, "dampingFactor", 0.0, why, reader);
     if let Some(decay) = xml::child(gazebo, "velocity_decay") {
-        refuse_unless(decay, "linear", 0.0, why, reader);
-        refuse_unless(decay, "angular", 0.0, why, reader);
+        check_drag(decay, reader);
     }
     let why = "joints have no springs";
     refuse_unless(gazebo, "springStiffness", 0.0, why, reader);

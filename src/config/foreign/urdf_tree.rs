@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use crate::foreign::geometry::{KINDS, cone, kind_of};
+use crate::foreign::geometry::{Primitive, check_scale, cone, kind_of, primitive};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostics, did_you_mean};
 use actcheck_data::{
@@ -15,7 +15,7 @@ use actcheck_data::{
 /// Supported joint types.
 const TYPES: [&str; 4] = ["fixed", "prismatic", "revolute", "continuous"];
 
-/// Elements of a joint of which there is one.
+/// Elements that a joint may have once.
 const SINGLE: [&str; 8] = [
     "origin",
     "parent",
@@ -26,6 +26,9 @@ const SINGLE: [&str; 8] = [
     "mimic",
     "safety_controller",
 ];
+
+/// Help text about the root of a document.
+pub(crate) const URDF_ROOT: &str = "a URDF file begins with `<robot name=\"…\">`";
 
 /// A tree, and the faults of shapes that are only seen: they matter if such a shape has to collide.
 pub(crate) struct UrdfTree {
@@ -145,7 +148,12 @@ fn read_passing(root: Node, tree: &mut ModelTree, reader: &mut Reader) {
         for name in [first, second] {
             if tree.link(name).is_none() {
                 let help = did_you_mean(name, tree.links.iter().map(|link| link.name.as_str()));
-                reader.error("W051", pair, format!("there is no link `{name}`"), help);
+                reader.error(
+                    "W051",
+                    pair,
+                    format!("the model has no link `{name}`"),
+                    help,
+                );
             }
         }
         tree.passing.push([first.to_owned(), second.to_owned()]);
@@ -296,57 +304,31 @@ fn read_geometry(
     reader: &mut Reader,
 ) -> Option<TreeGeometry> {
     let kind = kind_of(geometry, reader)?;
-    let number = |name: &str, reader: &mut Reader| {
-        let written = reader.attribute(kind, name)?;
-        reader
-            .numbers::<1>(kind, written, Bound::Length)
-            .map(|[number]| number)
-    };
-    let three = |name: &str, reader: &mut Reader| {
-        let written = reader.attribute(kind, name)?;
-        reader.numbers::<3>(kind, written, Bound::Length)
-    };
-    match kind.tag_name().name() {
-        "box" => three("size", reader).map(|size| TreeGeometry::Box { size }),
-        "ellipsoid" => three("radii", reader).map(|radii| TreeGeometry::Ellipsoid { radii }),
-        "sphere" => number("radius", reader).map(|radius| TreeGeometry::Sphere { radius }),
-        round @ ("cylinder" | "capsule") => {
-            let (radius, length) = (number("radius", reader), number("length", reader));
-            let (radius, length) = (radius?, length?);
-            Some(if round == "cylinder" {
-                TreeGeometry::Cylinder { radius, length }
-            } else {
-                TreeGeometry::Capsule { radius, length }
-            })
-        }
-        "cone" => {
-            let (radius, length) = (number("radius", reader), number("length", reader));
+    if kind.tag_name().name() == "mesh" {
+        return mesh(kind, reader);
+    }
+    let written = |name: &str, reader: &mut Reader| Some((kind, reader.attribute(kind, name)?));
+    match primitive(kind, reader, written)? {
+        Primitive::Geometry(geometry) => Some(geometry),
+        Primitive::Cone { radius, length } => {
             let name = format!("cone {}", meshes.len());
-            meshes.insert(name.clone(), cone(radius?, length?)?);
+            meshes.insert(name.clone(), cone(radius, length)?);
             Some(TreeGeometry::Mesh {
                 file: name,
                 scale: [1.0; 3],
             })
         }
-        "mesh" => {
-            let file = reader.attribute(kind, "filename")?.to_owned();
-            let scale = match kind.attribute("scale") {
-                Some(scale) => reader.numbers(kind, scale, Bound::Finite)?,
-                None => [1.0; 3],
-            };
-            if scale.contains(&0.0) {
-                let message = "the mesh's scale must not be 0".to_owned();
-                reader.error("W034", kind, message, "write 1 for the file's own size");
-                return None;
-            }
-            Some(TreeGeometry::Mesh { file, scale })
-        }
-        other => {
-            let message = format!("the geometry `<{other}>` can't be simulated");
-            reader.error("W035", kind, message, KINDS);
-            None
-        }
     }
+}
+
+fn mesh(kind: Node, reader: &mut Reader) -> Option<TreeGeometry> {
+    let file = reader.attribute(kind, "filename")?.to_owned();
+    let scale = match kind.attribute("scale") {
+        Some(scale) => reader.numbers(kind, scale, Bound::Finite)?,
+        None => [1.0; 3],
+    };
+    check_scale(scale, &reader.place(kind), &mut reader.found)?;
+    Some(TreeGeometry::Mesh { file, scale })
 }
 
 /// Reads a joint. One with a fault, which has been reported, is of an unknown kind.
@@ -511,7 +493,7 @@ fn end<'n>(
     let link = reader.attribute(end, "link")?;
     if !links.contains(link) {
         let help = did_you_mean(link, links.iter().copied());
-        reader.error("W051", end, format!("there is no link `{link}`"), help);
+        reader.error("W051", end, format!("the model has no link `{link}`"), help);
         return None;
     }
     Some(link)

@@ -1,4 +1,4 @@
-//! Writes a robot's tree as URDF, for skills, which know no other format.
+//! Writes a robot's tree as URDF: skills read only this format.
 
 use nalgebra::Isometry3;
 use urdf_rs::{

@@ -9,7 +9,7 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::foreign::body::{Body, Role};
 use crate::foreign::building::{self, Solid, Split};
-use crate::foreign::elements::Children;
+use crate::foreign::elements::{Children, is_usual_gravity};
 use crate::foreign::folder::{self, Including};
 use crate::foreign::geometry::Shapes;
 use crate::foreign::inclusions::Inclusions;
@@ -50,12 +50,10 @@ const WORLD: Children = Children {
     harmless: &["actor", "joint"],
     refused: &["population"],
 };
-/// Acceleration by gravity in the simulation. Unit: m/s².
-const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 /// Files round gravity, and it differs between places on Earth. Unit: m/s².
 const GRAVITY_TOLERANCE: f64 = 0.1;
 /// Included models to skip: every world already has a floor and light.
-pub(super) const ALWAYS_THERE: [&str; 2] = ["ground_plane", "sun"];
+const ALWAYS_THERE: [&str; 2] = ["ground_plane", "sun"];
 /// A model that is tilted by more than this gets a model of its own. Unit: cosine.
 const UPRIGHT_COSINE: f64 = 0.999;
 
@@ -615,8 +613,8 @@ impl WorldReader<'_> {
     }
 }
 
-/// Whether an `<include>` names a model that every world has already.
-fn is_always_there(uri: Node) -> bool {
+/// Whether the `<uri>` of an `<include>` names a model that every world has already.
+pub(super) fn is_always_there(uri: Node) -> bool {
     let named = folder::name_in(xml::text(uri));
     ALWAYS_THERE.contains(&named.to_lowercase().replace(' ', "_").as_str())
 }
@@ -635,8 +633,7 @@ fn check_gravity(world: Node, reader: &mut Reader) {
         let Some(written) = reader.numbers::<3>(node, xml::text(node), Bound::Finite) else {
             continue;
         };
-        let is_near = |(found, usual): (&f64, &f64)| (found - usual).abs() <= GRAVITY_TOLERANCE;
-        if !written.iter().zip(&GRAVITY).all(is_near) {
+        if !is_usual_gravity(written, GRAVITY_TOLERANCE) {
             let [x, y, z] = written;
             let message = format!("gravity of {x} {y} {z} m/s² can't be simulated");
             let help = "write `<gravity>0 0 -9.81</gravity>`, or remove it";

@@ -324,6 +324,17 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// Returns `Some` if the root of a document has this name; otherwise reports W032.
+    pub(crate) fn root(&mut self, root: Node, name: &str, help: &str) -> Option<()> {
+        let found = root.tag_name().name();
+        if found == name {
+            return Some(());
+        }
+        let message = format!("the root is `<{found}>` instead of `<{name}>`");
+        self.error("W032", root, message, help);
+        None
+    }
+
     /// Returns a required child; reports W033 and returns `None` if it is missing.
     pub(crate) fn required<'n>(&mut self, node: Node<'n>, name: &str) -> Option<Node<'n>> {
         let found = child(node, name);

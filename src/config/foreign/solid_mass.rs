@@ -1,4 +1,5 @@
-//! Mass, centre and inertia of shapes from their densities, as MuJoCo computes them for its geoms.
+//! Mass, centre and inertia of solids: of single shapes, of meshes as MuJoCo and as Gazebo weigh them,
+//! and of several solids together.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -8,9 +9,12 @@ use nalgebra::{Isometry3, Matrix3, Vector3};
 use crate::foreign::hull::convex_hull;
 use actcheck_data::{Amount, Matter, Mesh, Shape, Spread, TreeGeometry, TreeSolid};
 
+/// Smallest volume with moments of inertia of its own. Unit: cubic metres.
+const LEAST_VOLUME: f64 = 1e-15;
+
 /// The mass of a body. Frame: that of the shape, or of the link.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct GeomMass {
+pub(crate) struct SolidMass {
     /// Unit: kilograms.
     pub(crate) kg: f64,
     /// Centre of mass. Unit: metres.
@@ -19,20 +23,21 @@ pub(crate) struct GeomMass {
     pub(crate) about_com: Matrix3<f64>,
 }
 
-impl GeomMass {
+impl SolidMass {
     const NONE: Self = Self {
         kg: 0.0,
         com: Vector3::new(0.0, 0.0, 0.0),
         about_com: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     };
 
-    /// Adds another mass in the same frame, by the parallel axis theorem.
-    fn plus(self, other: Self) -> Self {
-        let kg = self.kg + other.kg;
+    /// Returns the masses of one frame as one, by the parallel axis theorem; a mass of 0 if all are 0.
+    pub(crate) fn together(masses: &[Self]) -> Self {
+        let kg: f64 = masses.iter().map(|mass| mass.kg).sum();
         if kg <= 0.0 {
-            return self;
+            return Self::NONE;
         }
-        let com = (self.com * self.kg + other.com * other.kg) / kg;
+        let first: Vector3<f64> = masses.iter().map(|mass| mass.com * mass.kg).sum();
+        let com = first / kg;
         let about = |mass: &Self| {
             let arm = mass.com - com;
             mass.about_com
@@ -41,11 +46,50 @@ impl GeomMass {
         Self {
             kg,
             com,
-            about_com: about(&self) + about(&other),
+            about_com: masses.iter().map(about).sum(),
         }
     }
 
-    fn moved(self, by: &Isometry3<f64>) -> Self {
+    /// Returns the mass of a shape with a density of 1, in its own frame; `None` if it encloses no
+    /// volume.
+    pub(crate) fn of_shape(shape: &Shape) -> Option<Self> {
+        let primitive = match shape {
+            Shape::Box { size } => TreeGeometry::Box { size: *size },
+            Shape::Sphere { radius } => TreeGeometry::Sphere { radius: *radius },
+            Shape::Cylinder { radius, height } => TreeGeometry::Cylinder {
+                radius: *radius,
+                length: *height,
+            },
+            Shape::Capsule { radius, height } => TreeGeometry::Capsule {
+                radius: *radius,
+                length: *height,
+            },
+            Shape::Mesh { mesh } => return enclosed(mesh),
+            Shape::Tube { .. } | Shape::Hull { .. } => return None,
+        };
+        Some(Self::of_primitive(&primitive))
+    }
+
+    /// Returns the mass of a primitive with a density of 1, in its own frame; a mass of 0 for a mesh.
+    pub(crate) fn of_primitive(geometry: &TreeGeometry) -> Self {
+        of_primitive(geometry, false)
+    }
+
+    /// Returns the mass of a cone with a density of 1, its tip above and the middle of its height at
+    /// the origin. Unit: metres.
+    pub(crate) fn of_cone(radius: f64, length: f64) -> Self {
+        let kg = PI * radius * radius * length / 3.0;
+        let across = 3.0 / 20.0 * radius * radius + 3.0 / 80.0 * length * length;
+        let about_z = 3.0 / 10.0 * radius * radius;
+        Self {
+            kg,
+            com: Vector3::new(0.0, 0.0, -length / 4.0),
+            about_com: Matrix3::from_diagonal(&Vector3::new(across, across, about_z)) * kg,
+        }
+    }
+
+    /// Returns the mass in another frame, in which its own is at `by`.
+    pub(crate) fn moved(self, by: &Isometry3<f64>) -> Self {
         let turned = by.rotation.to_rotation_matrix();
         Self {
             kg: self.kg,
@@ -54,7 +98,7 @@ impl GeomMass {
         }
     }
 
-    fn times(self, factor: f64) -> Self {
+    pub(crate) fn times(self, factor: f64) -> Self {
         Self {
             kg: self.kg * factor,
             com: self.com,
@@ -68,7 +112,7 @@ impl GeomMass {
 #[derive(Default)]
 pub(crate) struct MeshMasses {
     /// By file, the bits of the scale, and the spread.
-    known: BTreeMap<(String, [u64; 3], Spread), GeomMass>,
+    known: BTreeMap<(String, [u64; 3], Spread), SolidMass>,
 }
 
 impl MeshMasses {
@@ -78,15 +122,19 @@ impl MeshMasses {
         &mut self,
         solids: impl IntoIterator<Item = &'a TreeSolid>,
         meshes: &BTreeMap<String, Vec<Shape>>,
-    ) -> GeomMass {
+    ) -> SolidMass {
         let masses = solids
             .into_iter()
             .filter_map(|solid| Some(self.of(solid, meshes)?.moved(&solid.pose)));
-        masses.fold(GeomMass::NONE, GeomMass::plus)
+        SolidMass::together(&masses.collect::<Vec<_>>())
     }
 
     /// Returns the mass of a shape in its own frame; `None` if it has none.
-    fn of(&mut self, solid: &TreeSolid, meshes: &BTreeMap<String, Vec<Shape>>) -> Option<GeomMass> {
+    fn of(
+        &mut self,
+        solid: &TreeSolid,
+        meshes: &BTreeMap<String, Vec<Shape>>,
+    ) -> Option<SolidMass> {
         let Matter { amount, spread } = solid.matter?;
         let unit = self.of_unit(&solid.geometry, spread, meshes)?;
         let factor = match amount {
@@ -102,7 +150,7 @@ impl MeshMasses {
         geometry: &TreeGeometry,
         spread: Spread,
         meshes: &BTreeMap<String, Vec<Shape>>,
-    ) -> Option<GeomMass> {
+    ) -> Option<SolidMass> {
         let TreeGeometry::Mesh { file, scale } = geometry else {
             return Some(of_primitive(geometry, spread == Spread::Shell));
         };
@@ -114,20 +162,20 @@ impl MeshMasses {
             Shape::Mesh { mesh } => Some(of_mesh(&mesh.scaled(*scale), spread)),
             _ => None,
         });
-        let mass = parts.fold(GeomMass::NONE, GeomMass::plus);
+        let mass = SolidMass::together(&parts.collect::<Vec<_>>());
         self.known.insert(key, mass);
         Some(mass)
     }
 }
 
-fn of_primitive(geometry: &TreeGeometry, is_shell: bool) -> GeomMass {
-    let centred = |kg: f64, moments: [f64; 3]| GeomMass {
+fn of_primitive(geometry: &TreeGeometry, is_shell: bool) -> SolidMass {
+    let centred = |kg: f64, moments: [f64; 3]| SolidMass {
         kg,
         com: Vector3::zeros(),
         about_com: Matrix3::from_diagonal(&Vector3::from(moments)),
     };
     match geometry {
-        TreeGeometry::Mesh { .. } => GeomMass::NONE,
+        TreeGeometry::Mesh { .. } => SolidMass::NONE,
         TreeGeometry::Box { size } if is_shell => hollow_box(*size),
         TreeGeometry::Box { size: [x, y, z] } => {
             let (kg, [xx, yy, zz]) = (x * y * z, [x * x, y * y, z * z]);
@@ -162,7 +210,7 @@ fn of_primitive(geometry: &TreeGeometry, is_shell: bool) -> GeomMass {
 }
 
 /// A cylinder between two halves of a ball; a shell has no lids between them.
-fn capsule(r: f64, length: f64, is_shell: bool) -> GeomMass {
+fn capsule(r: f64, length: f64, is_shell: bool) -> SolidMass {
     // Mass, moment about z, and moment across it about the own centre of the cylinder.
     let (tube, tube_z, tube_across) = if is_shell {
         let kg = 2.0 * PI * r * length;
@@ -185,7 +233,7 @@ fn capsule(r: f64, length: f64, is_shell: bool) -> GeomMass {
     // Each half is moved away by half of the length along z.
     let balls_across = ball + balls * (half * half + 2.0 * half * centre);
     let across = tube_across + balls_across;
-    GeomMass {
+    SolidMass {
         kg: tube + balls,
         com: Vector3::zeros(),
         about_com: Matrix3::from_diagonal(&Vector3::new(across, across, tube_z + ball)),
@@ -193,8 +241,8 @@ fn capsule(r: f64, length: f64, is_shell: bool) -> GeomMass {
 }
 
 /// The six faces of a box.
-fn hollow_box(size: [f64; 3]) -> GeomMass {
-    let mut whole = GeomMass::NONE;
+fn hollow_box(size: [f64; 3]) -> SolidMass {
+    let mut faces = Vec::new();
     for axis in 0..3 {
         let [a, b] = [size[(axis + 1) % 3], size[(axis + 2) % 3]];
         let kg = a * b;
@@ -205,14 +253,14 @@ fn hollow_box(size: [f64; 3]) -> GeomMass {
         for side in [-0.5, 0.5] {
             let mut com = Vector3::zeros();
             com[axis] = side * size[axis];
-            whole = whole.plus(GeomMass {
+            faces.push(SolidMass {
                 kg,
                 com,
                 about_com: Matrix3::from_diagonal(&moments),
             });
         }
     }
-    whole
+    SolidMass::together(&faces)
 }
 
 /// The sums over the pyramids from a point to the triangles of a mesh, or over the triangles
@@ -261,15 +309,15 @@ impl Sums {
 /// A mesh by MuJoCo's usual rule: the centre of mass follows from the pyramids to the middle of its
 /// surface, and volume and moments from those to the centre of mass. For a closed mesh, both are
 /// exact.
-fn of_mesh(mesh: &Mesh, spread: Spread) -> GeomMass {
+fn of_mesh(mesh: &Mesh, spread: Spread) -> SolidMass {
     if spread == Spread::Hull {
         let triangles = convex_hull(&mesh.vertices);
         let hull = Mesh::new(mesh.vertices.clone(), triangles);
-        return hull.map_or(GeomMass::NONE, |hull| of_mesh(&hull, Spread::Inside));
+        return hull.map_or(SolidMass::NONE, |hull| of_mesh(&hull, Spread::Inside));
     }
     let surface = Sums::from(Vector3::zeros(), mesh, Spread::Shell);
     if surface.amount <= 0.0 {
-        return GeomMass::NONE;
+        return SolidMass::NONE;
     }
     let middle = surface.first / surface.amount;
     let com = if spread == Spread::Shell {
@@ -277,16 +325,34 @@ fn of_mesh(mesh: &Mesh, spread: Spread) -> GeomMass {
     } else {
         let solid = Sums::from(middle, mesh, spread);
         if solid.amount <= 0.0 {
-            return GeomMass::NONE;
+            return SolidMass::NONE;
         }
         middle + solid.first / solid.amount
     };
     let sums = Sums::from(com, mesh, spread);
-    GeomMass {
+    SolidMass {
         kg: sums.amount,
         com,
         about_com: Matrix3::identity() * sums.second.trace() - sums.second,
     }
+}
+
+/// The mass of the solid that a mesh encloses, with a density of 1: Gazebo's rule. A mesh that is
+/// inside out encloses the same solid. Returns `None` if it encloses none.
+fn enclosed(mesh: &Mesh) -> Option<SolidMass> {
+    let corner = Vector3::from(*mesh.vertices.first()?);
+    let sums = Sums::from(corner, mesh, Spread::Exact);
+    let kg = sums.amount.abs();
+    if kg < LEAST_VOLUME {
+        return None;
+    }
+    let com = sums.first / sums.amount;
+    let second = sums.second * sums.amount.signum() - com * com.transpose() * kg;
+    Some(SolidMass {
+        kg,
+        com: corner + com,
+        about_com: Matrix3::identity() * second.trace() - second,
+    })
 }
 
 /// Half extents of the box with the same inertia as a mesh, and the frame of its principal axes,
@@ -450,5 +516,85 @@ mod tests {
         }
         assert!((pose.rotation * Vector3::z()).x.abs() > 0.999_999);
         assert!((pose.translation.vector - Vector3::x()).norm() < 1e-9);
+    }
+
+    fn near(found: f64, expected: f64) {
+        assert!(
+            (found - expected).abs() < 1e-12 * expected.abs().max(1e-3),
+            "{found} is not {expected}"
+        );
+    }
+
+    #[test]
+    fn a_mesh_has_the_moments_of_the_solid_that_it_encloses() {
+        let size = [0.05, 0.07, 0.1];
+        let solid = SolidMass::of_shape(&Shape::Box { size }).expect("it has a volume");
+        let half = size.map(|side| side / 2.0);
+        let mut mesh = box_mesh(half, half);
+        for _ in 0..2 {
+            let found =
+                SolidMass::of_shape(&Shape::Mesh { mesh: mesh.clone() }).expect("it is closed");
+            near(found.kg, solid.kg);
+            for (axis, side) in size.into_iter().enumerate() {
+                near(found.com[axis], side / 2.0);
+                near(found.about_com[(axis, axis)], solid.about_com[(axis, axis)]);
+            }
+            near(found.about_com[(0, 1)], 0.0);
+            // Inside out it is the same solid.
+            mesh.triangles
+                .iter_mut()
+                .for_each(|corners| corners.swap(1, 2));
+        }
+    }
+
+    #[test]
+    fn a_capsule_is_a_cylinder_with_two_hemispheres() {
+        let ball = SolidMass::of_shape(&Shape::Sphere { radius: 0.3 }).expect("it has a volume");
+        let short = SolidMass::of_shape(&Shape::Capsule {
+            radius: 0.3,
+            height: 0.0,
+        })
+        .expect("it has a volume");
+        let axes = [0, 1, 2].map(|axis| (axis, axis));
+        for at in axes {
+            near(short.about_com[at], ball.about_com[at]);
+        }
+        // The formula of libsdformat's authors.
+        let (radius, length) = (0.2, 0.5);
+        let capsule = SolidMass::of_shape(&Shape::Capsule {
+            radius,
+            height: length,
+        })
+        .expect("it has a volume");
+        let (r2, l2) = (radius * radius, length * length);
+        let cylinder = std::f64::consts::PI * r2 * length;
+        let sphere = std::f64::consts::PI * r2 * radius * 4.0 / 3.0;
+        let across = cylinder * (l2 + 3.0 * r2) / 12.0
+            + sphere * (2.0 * r2 / 5.0 + l2 / 4.0 + 3.0 / 8.0 * length * radius);
+        near(capsule.about_com[(0, 0)], across);
+    }
+
+    #[test]
+    fn two_halves_are_the_whole() {
+        let half = SolidMass::of_shape(&Shape::Box {
+            size: [0.1, 0.2, 0.3],
+        })
+        .expect("it has a volume");
+        let at = |x: f64| {
+            half.times(500.0)
+                .moved(&Isometry3::translation(x, 0.0, 0.0))
+        };
+        let found = SolidMass::together(&[at(0.0), at(0.1)]);
+        let whole = SolidMass::of_shape(&Shape::Box {
+            size: [0.2, 0.2, 0.3],
+        })
+        .expect("it has a volume")
+        .times(500.0)
+        .moved(&Isometry3::translation(0.05, 0.0, 0.0));
+        near(found.kg, whole.kg);
+        near(found.com.x, 0.05);
+        for axis in 0..3 {
+            near(found.about_com[(axis, axis)], whole.about_com[(axis, axis)]);
+        }
     }
 }
