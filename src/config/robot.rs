@@ -319,11 +319,8 @@ pub fn bare(
     let none = String::new;
     let profile = RobotProfile {
         name: name.split('.').next().unwrap_or_default().to_owned(),
-        digest: match read.meshes.is_empty() {
-            true => digest_of(&read.text.text),
-            false => digest_of(&format!("{}{}", digest_of(&read.text.text), read.digest)),
-        },
-        urdf: read.urdf.clone(),
+        digest: read.digest_with(digest_of(&read.text.text)),
+        urdf: read.urdf,
         tree: Arc::new(read.tree),
         base_joints: None,
         planar_base: false,
@@ -506,10 +503,7 @@ fn read_table(
     let mut digest = Digest::new();
     digest.update(table.source().text.as_bytes());
     digest.update(read.text.text.as_bytes());
-    let mut digest = digest.finish();
-    if !read.meshes.is_empty() {
-        digest = digest_of(&format!("{digest}{}", read.digest));
-    }
+    let digest = read.digest_with(digest.finish());
     let profile = RobotProfile {
         name,
         urdf: read.urdf.clone(),

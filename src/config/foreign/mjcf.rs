@@ -20,7 +20,7 @@ use crate::foreign::mjcf_graft::Graft;
 use crate::foreign::mjcf_masks::{Contacts, Mask, collides};
 use crate::foreign::solid_mass::{MeshMasses, SolidMass};
 use crate::foreign::xml::{self, Bound, Node, Reader};
-use actcheck_base::{Diagnostic, Diagnostics, Source, SourceSpan};
+use actcheck_base::{Diagnostics, Source, SourceSpan};
 use actcheck_data::{
     Mesh, ModelTree, Spread, TreeInertial, TreeJoint, TreeLink, TreeMimic, TreeMotion, TreeSolid,
 };
@@ -817,9 +817,8 @@ impl Model<'_> {
                     let message =
                         "this mesh has no exact inertia: its triangles are turned inwards";
                     let help = "write `inertia=\"legacy\"` at its `<mesh>`, or turn its triangles";
-                    let fault = Diagnostic::error("W037", message)
-                        .at(&geom.place.source, xml::tag(&geom.place));
-                    reader.found.push(fault.help(help));
+                    let place = xml::at_tag(&geom.place);
+                    reader.error_in("W037", place, message.to_owned(), help);
                 }
             }
             let SolidMass { kg, com, about_com } = masses.together(heavy, &meshes);
@@ -836,9 +835,7 @@ impl Model<'_> {
                 let message = format!("the body `{}` moves and has no mass", link.name);
                 let help =
                     "add an `<inertial>`: with `inertiafromgeom=\"false\"`, geoms have no mass";
-                let fault = Diagnostic::error("W033", message)
-                    .at(&link.place.source, xml::tag(&link.place));
-                reader.found.push(fault.help(help));
+                reader.error_in("W033", xml::at_tag(&link.place), message, help);
             }
         }
         for link in &mut self.tree.links {

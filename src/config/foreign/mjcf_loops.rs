@@ -92,7 +92,14 @@ pub(super) fn couplings(
     let loops = elements(root, "equality")
         .filter(|node| node.has_tag_name("connect") && node.attribute("active") != Some("false"));
     let mut closures = Vec::new();
-    for node in loops.take(MOST_LOOPS) {
+    for (idx, node) in loops.enumerate() {
+        if idx == MOST_LOOPS {
+            let message =
+                format!("this loop of links is left open: it is not among the first {MOST_LOOPS}");
+            let help = "its links then stay where the file puts them, as those of further loops do";
+            reader.warning("W036", node, message, help);
+            break;
+        }
         match tree.closure(node, compiler, reader) {
             Some(closure) if closure.hinges.is_empty() => {}
             Some(closure) => closures.push(closure),

@@ -9,7 +9,7 @@ use crate::foreign::robot_inertia::{self, Mend};
 use crate::foreign::urdf_tree::{self, URDF_ROOT, UrdfTree};
 use crate::foreign::xml::{self, Reader};
 use crate::foreign::{mjcf, robot_shapes, root_name, sdf_robot, tree_checks, urdf_writer};
-use actcheck_base::{Diagnostic, Diagnostics, Source};
+use actcheck_base::{Diagnostic, Diagnostics, Source, digest_of};
 use actcheck_data::{ModelTree, Shape};
 
 /// A robot as its file states it.
@@ -17,14 +17,25 @@ pub(crate) struct RobotFile {
     pub(crate) tree: ModelTree,
     /// Meshes by their file name in the tree.
     pub(crate) meshes: BTreeMap<String, Vec<Shape>>,
-    /// Digest of the mesh files.
-    pub(crate) digest: String,
+    /// Digest of what the text alone does not decide: the mesh files and the masses that follow from
+    /// them; `None` for a URDF without collision meshes.
+    digest: Option<String>,
     /// The text with all that it includes.
     pub(crate) text: Source,
     /// The robot in URDF: its own text, or its tree in this form.
     pub(crate) urdf: Source,
     /// Proposed changes of impossible moments of inertia; only for URDF.
     pub(crate) mends: Vec<Mend>,
+}
+
+impl RobotFile {
+    /// Adds the digest of the mesh files to that of a text.
+    pub(crate) fn digest_with(&self, text: String) -> String {
+        match &self.digest {
+            Some(meshes) => digest_of(&format!("{text}{meshes}")),
+            None => text,
+        }
+    }
 }
 
 /// A tree before its shapes are read.
@@ -133,10 +144,12 @@ fn complete(mut bare: Bare, path: &Path, lookup: &Lookup, found: &mut Diagnostic
         });
         Source::new(bare.text.name.to_string(), written)
     };
+    let is_in_text = bare.is_urdf && meshes.is_empty();
+    let digest = (!is_in_text).then(|| shapes.digest.finish());
     RobotFile {
         urdf,
         meshes,
-        digest: shapes.digest.finish(),
+        digest,
         text: bare.text,
         mends,
         tree: bare.tree,

@@ -12,7 +12,7 @@ use crate::foreign::sdf_pose::{self, pose};
 use crate::foreign::sdf_robot_include::{SdfFile, Submodels};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use crate::foreign::{sdf_robot_joint, sdf_robot_link};
-use actcheck_base::{Diagnostic, Diagnostics, did_you_mean};
+use actcheck_base::{Diagnostics, did_you_mean};
 use actcheck_data::{Mesh, TreeJoint, TreeLink, TreeMimic, TreeMotion};
 
 /// Longest name of a link with those of the models around it: all pairs of links may be listed.
@@ -126,11 +126,8 @@ impl Group {
             let message = format!(
                 "with its models, the name of this link is longer than {LONGEST_NAME} bytes"
             );
-            let place = &link.link.place;
-            let error = Diagnostic::error("W055", message).at(&place.source, xml::tag(place));
-            reader
-                .found
-                .push(error.help("give links and models shorter names"));
+            let help = "give links and models shorter names";
+            reader.error_in("W055", xml::at_tag(&link.link.place), message, help);
             return;
         }
         let solid = || {

@@ -7,7 +7,7 @@ use nalgebra::Isometry3;
 use crate::foreign::sdf_ends::JointEnd;
 use crate::foreign::sdf_robot_model::{Group, JointAt, LinkAt};
 use crate::foreign::xml::{self, Reader};
-use actcheck_base::{Diagnostic, Diagnostics};
+use actcheck_base::Diagnostics;
 use actcheck_data::{ModelTree, TreeJoint, TreeLink, TreeMotion};
 
 /// Smaller poses of the root are rounded zeros. Units: metres, radians.
@@ -127,9 +127,7 @@ fn leave_out_spare_links(group: &mut Group, reader: &mut Reader) {
             link.link.name
         );
         let help = "it has no shape and no mass; a joint of the type `fixed` would hold it";
-        let place = &link.link.place;
-        let warning = Diagnostic::warning("W036", message).at(&place.source, xml::tag(place));
-        reader.found.push(warning.help(help));
+        reader.warning_in("W036", xml::at_tag(&link.link.place), message, help);
     }
 }
 
@@ -143,11 +141,8 @@ fn warn_of_missing_masses(links: &[LinkAt], reader: &mut Reader) {
             (false, false) => continue,
         };
         let message = format!("`{}` states {missing}, the default of SDF", link.link.name);
-        let place = &link.link.place;
-        let warning = Diagnostic::warning("W036", message)
-            .at(&place.source, xml::tag(place))
-            .help("state `<mass>` and `<inertia>` of each link");
-        reader.found.push(warning);
+        let help = "state `<mass>` and `<inertia>` of each link";
+        reader.warning_in("W036", xml::at_tag(&link.link.place), message, help);
     }
 }
 
@@ -285,10 +280,8 @@ fn report_loops(group: &Group, closing: &[usize], reader: &mut Reader) {
     for idx in closing {
         let joint = &group.joints[*idx].joint;
         let message = format!("the joint `{}` closes a loop of links", joint.name);
-        let fault = Diagnostic::error("W035", message)
-            .at(&joint.place.source, xml::tag(&joint.place))
-            .help("loops can't be simulated: remove it, and couple the joints by `<mimic>`");
-        reader.found.push(fault);
+        let help = "loops can't be simulated: remove it, and couple the joints by `<mimic>`";
+        reader.error_in("W035", xml::at_tag(&joint.place), message, help);
     }
 }
 
@@ -297,10 +290,8 @@ fn report_loose(group: &Group, root: usize, above: &[Above], reader: &mut Reader
         if idx != root && above[idx].is_none() {
             let link = &link.link;
             let message = format!("no joint connects `{}` to the robot's root", link.name);
-            let fault = Diagnostic::error("W051", message)
-                .at(&link.place.source, xml::tag(&link.place))
-                .help("links form one tree: add a joint of the type `fixed`");
-            reader.found.push(fault);
+            let help = "links form one tree: add a joint of the type `fixed`";
+            reader.error_in("W051", xml::at_tag(&link.place), message, help);
         }
     }
 }

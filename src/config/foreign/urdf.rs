@@ -15,7 +15,7 @@ use crate::foreign::tree_object;
 use crate::foreign::urdf_extra::{self, Contact, Extras};
 use crate::foreign::urdf_tree::{self, URDF_ROOT};
 use crate::foreign::xml::{self, Node, Reader};
-use actcheck_base::{Diagnostics, Source, SourceSpan};
+use actcheck_base::{Diagnostics, Source};
 use actcheck_data::{ModelTree, TreeJoint, TreeMotion};
 
 /// Reads the object of a URDF file and its faults. The object is `None` if there are errors.
@@ -146,17 +146,10 @@ fn check_links<'a>(
             if inertial.kg == 0.0 && !link.solids.is_empty() {
                 let message = format!("the link `{}` collides but has a mass of 0", link.name);
                 let help = "state its mass in kilograms; an object that never moves has `<gazebo><static>true</static></gazebo>`";
-                reader.error_in("W034", tag(&inertial.place), message, help);
+                reader.error_in("W034", xml::at_tag(&inertial.place), message, help);
             }
         }
         contacts.insert(idx, (*node, contact));
     }
     contacts
-}
-
-fn tag(place: &SourceSpan) -> SourceSpan {
-    SourceSpan {
-        span: xml::tag(place),
-        ..place.clone()
-    }
 }

@@ -570,11 +570,7 @@ impl WorldReader<'_> {
             };
             // The first link of a piece is the frame of its body.
             let place = piece.tree.links.first().map(|link| link.place.clone());
-            let place = place.unwrap_or_else(|| self.reader.place(root));
-            let place = SourceSpan {
-                span: xml::tag(&place),
-                ..place
-            };
+            let place = xml::at_tag(&place.unwrap_or_else(|| self.reader.place(root)));
             self.warn_if_movable(!piece.moves, &piece.name, place.clone());
             model.body.fixed = true;
             let furniture = self.place(

@@ -157,6 +157,14 @@ pub(crate) fn tag(place: &SourceSpan) -> Span {
     place.span.start..name.map_or(place.span.end, |name| place.span.start + name)
 }
 
+/// Returns the place of an element's start tag up to the end of its name.
+pub(crate) fn at_tag(place: &SourceSpan) -> SourceSpan {
+    SourceSpan {
+        source: place.source.clone(),
+        span: tag(place),
+    }
+}
+
 /// Returns the first child element.
 pub(crate) fn first(node: Node<'_>) -> Option<Node<'_>> {
     node.children().find(Node::is_element)
