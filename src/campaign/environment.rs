@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use crate::budget::runs_per_test;
 use crate::case::check_case;
+use crate::relations::RelationRules;
 use crate::requirement::Requirement;
 use crate::rule_set::recorded_rules;
 use crate::{plausible, solids};
@@ -41,6 +42,8 @@ pub struct Env {
     pub(super) text: String,
     /// The requirement on scenes, if the configuration has one.
     pub(super) requirement: Option<Requirement>,
+    /// The rules of the relations, if the configuration has some.
+    pub(super) relations: Option<RelationRules>,
     /// The program that performs actions instead of the reference skills, if the configuration
     /// names one.
     pub(super) programs: Option<Programs>,
@@ -177,7 +180,7 @@ impl Env {
     pub(super) fn of(mut campaign: Campaign, rule_budget: Budget) -> Result<Self, Diagnostics> {
         let (files, path) = &campaign.ontology;
         let mut ontology = ontology::load(files, path)?;
-        forget_requirement(&campaign, &mut ontology);
+        forget_named(&campaign, &mut ontology);
         let mut faults = Diagnostics::new();
         categorise(&mut campaign, &ontology);
         solids::decompose_meshes(&mut campaign, &mut faults);
@@ -202,6 +205,11 @@ impl Env {
             .map_err(|found| faults.extend(found))
             .ok()
             .flatten();
+        let relations = RelationRules::prepare(&campaign, &ontology, &rule_budget);
+        let relations = relations
+            .map_err(|found| faults.extend(found))
+            .ok()
+            .flatten();
         match (robot, space, rules) {
             (Some(robot), Some(space), Some(rules)) if !faults.has_errors() => {
                 let of_case = check_case(&campaign, &space);
@@ -221,6 +229,7 @@ impl Env {
                     rule_budget,
                     text,
                     requirement,
+                    relations,
                     programs,
                 })
             }
@@ -372,20 +381,19 @@ pub(super) fn recorded_overrides(history: &History, record: &CampaignRecord) -> 
     }
 }
 
-/// Drops the warning O017 about the rule file that `[scene] require` names.
-fn forget_requirement(campaign: &Campaign, ontology: &mut Ontology) {
+/// Drops the warnings O017 about the rule files that `[scene] require` and `[relations]` name.
+fn forget_named(campaign: &Campaign, ontology: &mut Ontology) {
     let file = |source: &Source| std::fs::canonicalize(&*source.name).ok();
-    let Some(required) = campaign.scene_rule.as_ref().and_then(file) else {
-        return;
-    };
-    let is_required = |found: &Diagnostic| {
+    let rules = campaign.relations.iter().map(|relation| &relation.rule);
+    let named: Vec<PathBuf> = rules.chain(&campaign.scene_rule).filter_map(file).collect();
+    let is_named = |found: &Diagnostic| {
         let path = found.source.as_ref().and_then(file);
-        path.is_some_and(|path| path == required)
+        path.is_some_and(|path| named.contains(&path))
     };
     let unlinked = std::mem::take(&mut ontology.unlinked);
     ontology.unlinked = unlinked
         .into_iter()
-        .filter(|found| !is_required(found))
+        .filter(|found| !is_named(found))
         .collect();
 }
 

@@ -20,7 +20,9 @@ use actcheck_base::{Diagnostic, Diagnostics, Outcome};
 use actcheck_config as config;
 use actcheck_config::Overrides;
 use actcheck_data::{Choice, Choices};
-use actcheck_history::{CampaignRecord, FAILED_AGAIN, History, Repetition, RunFilter, RunRecord};
+use actcheck_history::{
+    CampaignRecord, FAILED_AGAIN, History, RELATED, Repetition, RunFilter, RunRecord,
+};
 use actcheck_rules::Budget;
 use actcheck_search::Strategy;
 
@@ -188,7 +190,7 @@ fn last_campaign(history: &History, config: &Path) -> Result<CampaignRecord, Dia
         .campaigns()?
         .iter()
         .rev()
-        .filter(|row| !row.name.starts_with(SHRUNK))
+        .filter(|row| !row.name.starts_with(SHRUNK) && !row.name.starts_with(RELATED))
     {
         let record = history.campaign(&row.id)?;
         if is_same_file(&config_of(history, &record), config) {

@@ -29,6 +29,7 @@ mod plausible;
 mod playable;
 mod preconditions;
 mod recheck;
+mod relations;
 mod replay;
 mod requirement;
 mod restore;
@@ -63,6 +64,7 @@ pub use line::{Clock, Disturbance, RunContext, RunInput, run_line, run_sabotaged
 pub use outcome::{CampaignResult, Ending, WeightedRate};
 pub use playable::{Playable, PlayableRun, PlayedAction, playable};
 pub use recheck::{RecheckEnd, RecheckOptions, judge_stored, recheck};
+pub use relations::{RelateOptions, relate};
 pub use replay::{
     Fit, Misfit, MisfitKind, OutcomeChange, Replay, ReplayOptions, StoredCampaign, replay_all,
 };

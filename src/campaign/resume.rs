@@ -13,7 +13,7 @@ use crate::shrink::SHRUNK;
 use crate::{Env, InputChange, RunResult, changes};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_config as config;
-use actcheck_history::{CampaignRecord, CampaignRow, FAILED_AGAIN, History, RunDetail};
+use actcheck_history::{CampaignRecord, CampaignRow, FAILED_AGAIN, History, RELATED, RunDetail};
 use actcheck_rules::Budget;
 
 /// The stored part of a resumed campaign.
@@ -64,13 +64,16 @@ pub fn unfinished(
             .any(|row| row.id == id && is_finished(row));
         return match finished {
             true => Err(finished_already(id)),
-            false if record.name.starts_with(FAILED_AGAIN) => Err(not_resumable(id)),
+            false if record.name.starts_with(FAILED_AGAIN) || record.name.starts_with(RELATED) => {
+                Err(not_resumable(id))
+            }
             false => Ok(record),
         };
     }
     for row in history.campaigns()?.iter().rev() {
         let is_made_otherwise = row.name.starts_with(SHRUNK)
             || row.name.starts_with(FAILED_AGAIN)
+            || row.name.starts_with(RELATED)
             || row.imported_from.is_some();
         if is_finished(row) || is_made_otherwise {
             continue;

@@ -11,7 +11,7 @@ use crate::{Env, RunContext};
 use actcheck_base::{Diagnostics, Outcome};
 use actcheck_data::Choices;
 use actcheck_history::{CampaignEnd, History, RunRecord, RunStatus};
-use actcheck_verdict::{Counts, Recurrence};
+use actcheck_verdict::{Counts, Recurrence, mean};
 
 /// The result of a case.
 #[derive(Debug, Clone)]
@@ -105,23 +105,24 @@ fn store(
 
 /// The end of a campaign of one run.
 pub(super) fn end_of(record: &RunRecord, ended: String) -> CampaignEnd {
-    let counts = Counts::of(
-        record
-            .judgements
-            .iter()
-            .flatten()
-            .map(|judgement| judgement.outcome),
-    );
+    end_of_all(std::slice::from_ref(record), ended, false)
+}
+
+/// The end of a campaign with these runs.
+pub(super) fn end_of_all(runs: &[RunRecord], ended: String, interrupted: bool) -> CampaignEnd {
+    let judgements = runs.iter().flat_map(|run| run.judgements.iter().flatten());
+    let counts = Counts::of(judgements.map(|judgement| judgement.outcome));
+    let whole = runs.iter().filter(|run| run.status != RunStatus::Broken);
     CampaignEnd {
         ended,
-        score: Some(record.score),
-        score_without_broken: (record.status != RunStatus::Broken).then_some(record.score),
+        score: mean(runs.iter().map(|run| run.score)),
+        score_without_broken: mean(whole.map(|run| run.score)),
         outcomes: Outcome::ALL
             .into_iter()
             .map(|outcome| (outcome, counts.get(outcome)))
             .collect(),
         discards: 0,
         ended_by: None,
-        interrupted: false,
+        interrupted,
     }
 }

@@ -291,6 +291,18 @@ pub enum Command {
         after_help = "Example:\n  actcheck cross-check k7f3 --runs 100 --python venv/bin/python    (with: pip install mujoco mcap)"
     )]
     CrossCheck(crate::cross_check::CrossCheckArgs),
+    /// Run the scenes of a campaign again with one change, and compare the verdicts of both runs
+    ///
+    /// `[relations]` in the configuration names the changes, such as a mirrored scene, more friction
+    /// or other names of the objects, and for each a rule about the verdicts of both runs. A
+    /// relation that does not hold shows a fault without knowing which of the two verdicts is right.
+    /// `actcheck run` makes the pairs too; here, missing ones are made, and all are judged by the
+    /// present rules. The second runs are stored as a campaign of their own, which no rate counts.
+    ///
+    /// Exit code: 0 all relations hold in all pairs, 1 some do not, 2 a pair could not be judged, 130
+    /// interrupted by Ctrl-C.
+    #[command(after_help = "Example:\n  actcheck relate k7f3 --config configs/pick_relations.toml")]
+    Relate(crate::relate::RelateArgs),
     /// Compare verdicts with people's labels: agreement, limits that fit better, likely wrong labels
     ///
     /// For each property with labels: how often its verdict agrees, and whether another limit in its

@@ -62,6 +62,7 @@ mod query;
 mod query_endpoint;
 mod recheck;
 mod regressions;
+mod relate;
 mod remote;
 mod replayed_runs;
 mod report;

@@ -14,7 +14,7 @@ use crate::progress::Progress;
 use crate::run_args::{RunArgs, Verbosity};
 use crate::session::{self, Opened, Session};
 use crate::work::{all_cores, quietly};
-use crate::{case, clock, health, output, shrink, stop};
+use crate::{case, clock, health, output, relate, shrink, stop};
 use actcheck_analysis as analysis;
 use actcheck_analysis::{Interval, Mirror, Sampling};
 use actcheck_base::{Diagnostic, Diagnostics, Outcome};
@@ -25,9 +25,10 @@ use actcheck_campaign::{
 use actcheck_history as history;
 use actcheck_history::{History, RunFilter, RunRecord, RunRow, newest_of_alike};
 use actcheck_report::{
-    CampaignSummary, EndedBy, GuidedSearch, HealthSummary, RunSummary, WeightedLine, campaign_json,
-    campaign_result_text, campaign_table, campaign_text, compare_text, health_json, health_lines,
-    shrunk_json, shrunk_text, with_shrunk,
+    CampaignSummary, EndedBy, GuidedSearch, HealthSummary, RelationsSummary, RunSummary,
+    WeightedLine, campaign_json, campaign_result_text, campaign_table, campaign_text, compare_text,
+    health_json, health_lines, relations_json, relations_text, shrunk_json, shrunk_text,
+    with_shrunk,
 };
 use actcheck_rules::Budget;
 use actcheck_verdict::{Counts, mean};
@@ -142,9 +143,24 @@ pub(super) fn campaign(
     } else {
         None
     };
+    let relates = finished.is_ok() && is_whole(&end) && failed.is_none();
+    let relate = || -> Result<Option<RelationsSummary>, Diagnostics> {
+        if !relates || env.campaign.relations.is_empty() {
+            return Ok(None);
+        }
+        let of = (summary.campaign.as_str(), None);
+        let related = relate::pairs_of(&env, &history, of, options.jobs, stop)?;
+        Ok(Some(relate::summary(&history, related)))
+    };
+    // CSV and JSON are one document; otherwise, users need not wait for the pairs.
+    let mut relations = match args.format {
+        Format::Text => None,
+        Format::Csv | Format::Json => relate()?,
+    };
     let results = Results {
         summary: &summary,
         health: health.as_ref(),
+        relations: relations.as_ref(),
         format: args.format,
         verbosity,
     };
@@ -156,8 +172,16 @@ pub(super) fn campaign(
     } else {
         results.print();
     }
-    let interrupted = shrinks && stop.load(Ordering::Relaxed);
+    if args.format == Format::Text {
+        relations = relate()?;
+        if let Some(relations) = &relations {
+            output::print(&format!("\n{}", relations_text(relations, output::page())));
+        }
+    }
+    let interrupted =
+        (shrinks || relations.is_some()) && is_whole(&end) && stop.load(Ordering::Relaxed);
     let code = exit_code(end.ending, faults, &summary)?;
+    let code = relations.map_or(code, |relations| code.max(relations.exit_code()));
     finished?;
     if interrupted {
         return Ok(stop::INTERRUPTED);
@@ -256,6 +280,8 @@ struct Results<'a> {
     summary: &'a CampaignSummary,
     /// The campaign's health: part of text and JSON, printed to the error stream beside CSV.
     health: Option<&'a HealthSummary>,
+    /// The relations between pairs of runs: part of JSON, printed to the error stream beside CSV.
+    relations: Option<&'a RelationsSummary>,
     format: Format,
     verbosity: Verbosity,
 }
@@ -285,6 +311,9 @@ impl Results<'_> {
     fn json(&self) -> serde_json::Value {
         let mut campaign = campaign_json(self.summary);
         campaign["health"] = self.health.map(health_json).into();
+        if let Some(relations) = self.relations {
+            campaign["relations"] = relations_json(relations);
+        }
         campaign
     }
 
@@ -293,6 +322,9 @@ impl Results<'_> {
             output::print_diagnostics(
                 &self.health.map(HealthSummary::warnings).unwrap_or_default(),
             );
+            if let Some(relations) = self.relations {
+                output::print_error_text(&relations_text(relations, output::page()));
+            }
         }
     }
 

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::{Case, Launcher, OtherCounts, Step, WorldMap, designators};
+use crate::{Case, Launcher, OtherCounts, Relation, Step, WorldMap, designators};
 
 /// One campaign: runs every test in `test_count` scenes, `repeat` times in each.
 #[derive(Debug, Clone)]
@@ -52,6 +52,8 @@ pub struct Campaign {
     pub other_counts: OtherCounts,
     /// Rules that every scene must satisfy (`[scene] require`).
     pub scene_rule: Option<Source>,
+    /// Relations between pairs of runs (`[relations]`).
+    pub relations: Vec<Relation>,
     /// Shares of targets and of other objects that lie on their side (`[pickObject] lying`,
     /// `[surfaceObjects] lying`).
     pub lying: (f64, f64),

@@ -52,7 +52,7 @@ impl<'a> Form<'a> {
                 .candidates
                 .get(name)
                 .map_or(Self::Number, |names| Self::Candidate(names)),
-            ChoiceName::Object(_, ObjectAxis::LeftOut) => Self::YesNo,
+            ChoiceName::Object(_, ObjectAxis::LeftOut) | ChoiceName::Renamed => Self::YesNo,
             ChoiceName::Step { .. } => Self::OfScene,
             _ => match (
                 choice.candidates(),

@@ -10,7 +10,7 @@ use actcheck_base::{Diagnostic, Diagnostics, Source};
 use actcheck_data::{Choice, ChoiceKind, ChoiceName, ObjectAxis};
 
 /// Keys without a meaning for a single scene.
-const OF_CAMPAIGNS: [&str; 5] = ["case", "history", "repeat", "search", "seed"];
+const OF_CAMPAIGNS: [&str; 6] = ["case", "history", "relations", "repeat", "search", "seed"];
 
 /// Keys of `[budget]` without a meaning for a single scene.
 const BUDGETS_OF_CAMPAIGNS: [&str; 3] = ["max_failures", "time", "until_width"];
@@ -312,7 +312,12 @@ fn written(choice: &Choice, counts: &OtherCounts) -> String {
     match (choice.candidate(), counts.of_choice(&choice.name)) {
         (Some(name), _) => Value::String(name.to_owned()).to_string(),
         (None, Some((least, _))) => (choice.value as u32 + least).to_string(),
-        (None, None) if matches!(choice.name, ChoiceName::Object(_, ObjectAxis::LeftOut)) => {
+        (None, None)
+            if matches!(
+                choice.name,
+                ChoiceName::Object(_, ObjectAxis::LeftOut) | ChoiceName::Renamed
+            ) =>
+        {
             (choice.value != 0.0).to_string()
         }
         (None, None) => format!("{:?}", choice.value),

@@ -8,7 +8,7 @@ use crate::designators::{self, Designators};
 use crate::paths::{check_unnamed, resolve_path};
 use crate::robot::{MendedUrdf, mended};
 use crate::table::WrittenStep;
-use crate::{Campaign, Overrides, Step, Table, case, model_library, ranges, skill};
+use crate::{Campaign, Overrides, Step, Table, case, model_library, ranges, relations, skill};
 use actcheck_base::{
     Diagnostic, Diagnostics, Files, Keep, Keeping, Severity, Source, Span, did_you_mean,
 };
@@ -77,6 +77,7 @@ pub fn load_text(
         .map_or(0, i64::unsigned_abs);
     let ontology = read_ontology_path(&mut table, folder);
     let scene_rule = read_scene_rule(&mut table, folder, &mut found);
+    let relations = relations::read(&mut table, folder, &mut found);
     let mut library = model_library::read(&mut table, folder, &mut found);
     let robot = library.read_robot(&mut table, folder, &mut found);
     let physics = ranges::read_physics(&mut table, &mut found);
@@ -151,6 +152,7 @@ pub fn load_text(
         other_counts,
         lying,
         scene_rule,
+        relations,
         start: library.start,
         physics,
         sensing,
@@ -279,27 +281,9 @@ fn read_search(table: &mut Table, found: &mut Diagnostics) -> Option<Strategy> {
 fn read_scene_rule(table: &mut Table, folder: &Path, found: &mut Diagnostics) -> Option<Source> {
     let mut scene = table.table("scene")?;
     scene.require(&["require"]);
-    let read = scene.string("require").and_then(|written| {
-        let path = resolve_path(folder, &written.value);
-        let is_rules = path
-            .extension()
-            .is_some_and(|ending| ending == "rls" || ending == "rq");
-        let read = if is_rules {
-            Files::Disk.read(&path).map_err(|fault| fault.to_string())
-        } else {
-            Err("it ends neither in `.rls` nor in `.rq`".to_owned())
-        };
-        read.map_err(|reason| {
-            let message = format!("cannot read the scene's rules {}: {reason}", path.display());
-            scene.fault(
-                "C022",
-                written.span,
-                message,
-                "the path is relative to the configuration",
-            );
-        })
-        .ok()
-    });
+    let read = scene
+        .string("require")
+        .and_then(|written| relations::rule_file(&mut scene, "the scene's", folder, &written));
     scene.finish(found);
     read
 }

@@ -50,6 +50,8 @@ pub enum ChoiceName {
     Robot(StartAxis),
     /// Number of the test's last actions that a shrunk run leaves out.
     ActionsLeftOut,
+    /// Whether all objects have other ids than usual: a relation between runs asks for it.
+    Renamed,
     /// The value of a designator in one action of the test, a candidate: the id of an object of the
     /// scene.
     Step {
@@ -113,7 +115,7 @@ const LANDMARK: &str = "odometry.landmark";
 const ODOMETRY: &str = "odometry";
 
 /// Names without a variable part.
-const FIXED: [(ChoiceName, &str); 13] = [
+const FIXED: [(ChoiceName, &str); 14] = [
     (ChoiceName::World, "world"),
     (ChoiceName::SurfaceName, "surface.name"),
     (ChoiceName::SurfaceModel, "surface.model"),
@@ -123,6 +125,7 @@ const FIXED: [(ChoiceName, &str); 13] = [
     (ChoiceName::OtherCount, "other.count"),
     (ChoiceName::PlaceOtherCount, "place_other.count"),
     (ChoiceName::ActionsLeftOut, "test.left_out"),
+    (ChoiceName::Renamed, "scene.renamed"),
     (ChoiceName::SkillSeed, "skill.seed"),
     (ChoiceName::MotionSamples, "motion.samples"),
     (ChoiceName::Gripper, "sense.gripper"),
@@ -201,6 +204,7 @@ impl ChoiceName {
             Self::OtherCount
             | Self::PlaceOtherCount
             | Self::ActionsLeftOut
+            | Self::Renamed
             | Self::Object(_, ObjectAxis::LeftOut) => None,
             Self::Object(
                 _,

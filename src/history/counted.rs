@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use regex::Regex;
 
-use crate::{History, RunFilter, RunRow};
+use crate::{History, RELATED, RunFilter, RunRow};
 use actcheck_base::Diagnostics;
 
 /// Name prefix of campaigns that ran the failed runs of another campaign again.
@@ -88,15 +88,16 @@ fn is_selected(campaign: &str) -> String {
     let case = CASE.replace('\\', r"\\");
     format!(
         "{{ ?ac_run act:shrunkFrom ?ac_original ; act:campaign {campaign} }} UNION \
-         {{ {campaign} a act:Campaign ; rdfs:label ?ac_name FILTER(STRSTARTS(?ac_name, '{FAILED_AGAIN}')) }} UNION \
+         {{ {campaign} a act:Campaign ; rdfs:label ?ac_name FILTER(STRSTARTS(?ac_name, '{FAILED_AGAIN}') || STRSTARTS(?ac_name, '{RELATED}')) }} UNION \
          {{ {campaign} a act:Campaign ; act:configText ?ac_text FILTER(REGEX(?ac_text, '{case}', 'm')) }}"
     )
 }
 
 impl History {
-    /// Returns the ids of the campaigns whose scenes were selected because they fail: those that
-    /// hold a shrunk run, those that ran the failed runs of another campaign again, and cases,
-    /// which have the table `case` in their configuration. Statistics leave them out.
+    /// Returns the ids of the campaigns whose scenes are not drawn as the configuration says:
+    /// those that hold a shrunk run, those that ran the failed runs of another campaign again or
+    /// its scenes with a change, and cases, which have the table `case` in their configuration.
+    /// Statistics leave them out.
     ///
     /// # Errors
     /// A file is damaged or can't be read.
@@ -109,6 +110,7 @@ impl History {
                 pattern.is_some_and(|pattern| pattern.is_match(&record.config_text))
             };
             let is_selected = record.name.starts_with(FAILED_AGAIN)
+                || record.name.starts_with(RELATED)
                 || is_case()
                 || self
                     .stored

@@ -5,13 +5,11 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::History;
-use actcheck_base::{Below, Diagnostic, Diagnostics};
+use crate::{History, beside};
+use actcheck_base::{Below, Diagnostics};
 
 /// Folder of the cross-checks in a history.
 const FOLDER: &str = "cross-checks";
-/// Largest file of a cross-check. Unit: bytes.
-const MOST_BYTES: u64 = 256 << 20;
 
 /// The comparison of runs of a campaign with the same runs in another engine.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -33,17 +31,7 @@ impl History {
     /// # Errors
     /// `H006` if it can't be written.
     pub fn store_cross_check(&self, check: &CrossCheck) -> Result<(), Diagnostics> {
-        let below = Below::new(self.dir());
-        let file = self.cross_check_file(&check.campaign);
-        let text = serde_json::to_string_pretty(check).unwrap_or_default();
-        let written = below
-            .create_folder(&self.dir().join(FOLDER))
-            .and_then(|()| below.write_atomic(&file, text.as_bytes()));
-        written.map_err(|error| {
-            Diagnostic::error("H006", format!("can't write {}: {error}", file.display()))
-                .help("free some space, or make the folder writable")
-                .into()
-        })
+        beside::store(self.dir(), &file_of(&check.campaign), check)
     }
 
     /// Returns the cross-check of a campaign, or `None` if there is none.
@@ -51,20 +39,8 @@ impl History {
     /// # Errors
     /// `H007` if its file is damaged.
     pub fn cross_check(&self, campaign: &str) -> Result<Option<CrossCheck>, Diagnostics> {
-        let below = Below::new(self.dir());
-        let file = self.cross_check_file(campaign);
-        if below.kind(&file).is_none() {
-            return Ok(None);
-        }
-        let damaged = |why: String| {
-            Diagnostic::error("H007", format!("{} can't be read: {why}", file.display()))
-                .help("remove it, and give `actcheck cross-check` again")
-        };
-        let text = below
-            .read_text(&file, MOST_BYTES)
-            .map_err(|error| damaged(error.to_string()))?;
-        let check = serde_json::from_str(&text).map_err(|error| damaged(error.to_string()))?;
-        Ok(Some(check))
+        let help = "remove it, and give `actcheck cross-check` again";
+        beside::read(self.dir(), &file_of(campaign), help)
     }
 
     /// Returns the contested runs of all cross-checks, each with the local names of its properties
@@ -88,10 +64,10 @@ impl History {
         }
         Ok(found)
     }
+}
 
-    fn cross_check_file(&self, campaign: &str) -> PathBuf {
-        self.dir().join(FOLDER).join(format!("{campaign}.json"))
-    }
+fn file_of(campaign: &str) -> PathBuf {
+    PathBuf::from(FOLDER).join(format!("{campaign}.json"))
 }
 
 #[cfg(test)]
@@ -121,7 +97,7 @@ mod tests {
         assert_eq!(history.cross_check("other").expect("none is needed"), None);
         let contested = history.contested().expect("it is there");
         assert_eq!(contested.keys().collect::<Vec<_>>(), ["k7f3-1"]);
-        std::fs::write(history.cross_check_file("k7f3"), "{").expect("it is writable");
+        std::fs::write(history.dir().join(file_of("k7f3")), "{").expect("it is writable");
         let faults = history.contested().expect_err("it is cut off").to_string();
         assert!(faults.contains("k7f3.json"), "{faults}");
     }

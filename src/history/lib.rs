@@ -4,6 +4,7 @@
 //! Never: judges, simulates, changes stored runs, or reads a clock.
 
 mod answer;
+mod beside;
 mod campaign;
 mod campaign_state;
 mod campaigns;
@@ -30,6 +31,7 @@ mod rdf_text;
 mod read_trace;
 mod recheck;
 mod record;
+mod related;
 mod resolve;
 mod restore;
 mod rows;
@@ -68,6 +70,7 @@ pub use record::{
     CampaignEnd, CampaignRecord, EpisodeRecord, FindingRecord, Repetition, RunObject, RunRecord,
     RunScene, RunStatus, SkillRecord,
 };
+pub use related::{RELATED, RelatedPair, RelatedRuns};
 pub use restore::Restore;
 pub use rows::{ActionDetail, CampaignRow, ObjectDetail, OutcomeRow, RunDetail, RunFilter, RunRow};
 pub use scene_digest::SceneDigest;

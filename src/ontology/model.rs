@@ -59,6 +59,31 @@ pub struct Action {
     pub parameters: BTreeSet<String>,
 }
 
+impl Action {
+    /// Creates an action without properties and designators. Its label is its local name.
+    pub fn new(iri: impl Into<String>) -> Self {
+        let iri = iri.into();
+        Self {
+            label: names::local(&iri).to_owned(),
+            iri,
+            comment: None,
+            performed_in: None,
+            success_properties: Vec::new(),
+            preconditions: Vec::new(),
+            premises: Vec::new(),
+            parameters: BTreeSet::new(),
+        }
+    }
+
+    /// Returns the action with these success properties.
+    pub fn with_properties(self, success_properties: Vec<String>) -> Self {
+        Self {
+            success_properties,
+            ..self
+        }
+    }
+}
+
 /// One property.
 #[derive(Debug, Clone)]
 #[non_exhaustive]

@@ -26,7 +26,7 @@ pub use html::{
 };
 pub use json::{
     campaign_json, case_json, compare_json, engines_json, findings_json, health_json, labels_json,
-    oracles_json, recheck_json, run_json, shrunk_json,
+    oracles_json, recheck_json, relations_json, run_json, shrunk_json,
 };
 pub use picture::{
     Caption, Chart, Drawing, collisions_picture, patterns_picture, robot_picture, run_picture,
@@ -37,16 +37,17 @@ pub use summary::{
     ActionSummary, CampaignSummary, CaseSummary, Causes, ChangeReason, CompareSummary,
     ComparedSide, EndedBy, EngineSummary, FindingsSummary, GuidedSearch, HealthSummary,
     LabelSummary, LabelledProperty, Oddity, OracleSummary, PassingValue, PropertyLine,
-    PropertyReport, Proportion, RateBounds, RecheckChange, RecheckLine, RecheckSummary, Remark,
-    RepeatedProperty, RunSummary, ShrunkChoice, ShrunkSummary, SideChange, WeightedLine,
+    PropertyReport, Proportion, RateBounds, RecheckChange, RecheckLine, RecheckSummary,
+    RelationsSummary, Remark, RepeatedProperty, RunSummary, ShrunkChoice, ShrunkSummary,
+    SideChange, WeightedLine,
 };
 pub use table::{
     Table, TableFormat, TableParts, answer_cells, answer_table, campaign_table, compare_table,
     engines_table, findings_table, health_table, labels_table, maps_table, oracles_table,
-    recheck_table, with_shrunk,
+    recheck_table, relations_table, with_shrunk,
 };
 pub use text::{
     FailureLines, Page, campaign_result_text, campaign_text, case_text, compare_text, engines_text,
-    findings_text, health_lines, health_text, labels_text, oracles_text, recheck_text, run_text,
-    scene_rule, shrunk_text,
+    findings_text, health_lines, health_text, labels_text, oracles_text, recheck_text,
+    relations_text, run_text, scene_rule, shrunk_text,
 };

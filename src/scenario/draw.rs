@@ -19,6 +19,9 @@ pub(super) const TRIES: u32 = 50;
 /// Gap between two platforms on an empty floor, wide enough for a robot to drive through. Unit:
 /// metres.
 const PLACE_GAP_M: f64 = 1.2;
+/// Number in the id of the first object of a scene with other ids; those of later objects are
+/// smaller, so that their alphabetical order is another one too.
+const MOST_RENAMED: usize = 999;
 /// Name of the world if the configuration names none.
 const DEFAULT_WORLD: &str = "empty";
 
@@ -57,6 +60,7 @@ pub enum Discard {
 /// No free place was found for an object or the robot, or the scene has nothing for a value of an
 /// action.
 pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, Discard> {
+    let renamed = choices.exception(ChoiceName::Renamed, 2) == 1;
     let mut builder = SceneBuilder {
         space,
         choices,
@@ -68,6 +72,7 @@ pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, 
         front: None,
         reach: None,
         ground_m: 0.0,
+        renamed,
     };
     let world = builder.choose_world();
     builder.choose_names();
@@ -166,6 +171,8 @@ pub(super) struct SceneBuilder<'a> {
     pub(super) ground_m: f64,
     /// The places within reach of a fixed arm, if its profile states them.
     pub(super) reach: Option<Reach>,
+    /// Whether ids are numbers without the model's name, in falling order.
+    renamed: bool,
 }
 
 impl<'a> SceneBuilder<'a> {
@@ -563,6 +570,10 @@ impl<'a> SceneBuilder<'a> {
             .chain(&self.left_out)
             .filter(|name| **name == model.name)
             .count();
+        if self.renamed {
+            let before = self.objects.len() + self.left_out.len();
+            return format!("thing_{}", MOST_RENAMED.saturating_sub(before));
+        }
         let ids = (taken + 1..).map(|number| format!("{}_{number}", model.name));
         // Furniture of a world may have any name.
         ids.into_iter()

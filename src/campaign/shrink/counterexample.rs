@@ -5,6 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::finished_run::RunPlace;
 use crate::line::simulate;
+use crate::relations::{judge_related, relation_called};
 use crate::run_cases::end_of;
 use crate::shrink::list::{drop_rejected_tries, has, with_value};
 use crate::shrink::{
@@ -13,6 +14,7 @@ use crate::shrink::{
 use crate::{Env, RunContext, RunInput, run_line};
 use actcheck_actions::Interference;
 use actcheck_base::{Diagnostic, Diagnostics, Judgement, Outcome, did_you_mean, names};
+use actcheck_config::SceneChange;
 use actcheck_data::{
     Choice, ChoiceGroup, ChoiceKind, ChoiceName, Choices, ObjectAxis, PlacedObject, Role,
 };
@@ -97,7 +99,9 @@ pub fn shrink(
 ) -> Result<Shrunk, Diagnostics> {
     check_candidates(env, index, recorded)?;
     let recorded = drop_rejected_tries(recorded);
+    let relation = options.property.and_then(|name| relation_called(env, name));
     let first = remake(env, index, &recorded, options)?;
+    let first = with_relation(env, index, relation, first, &options.context);
     let mut choices = Choices::recorded(&first.choices);
     let scene = scenario::draw(&env.space, env.test_of(index), &mut choices);
     let may_block =
@@ -107,6 +111,7 @@ pub fn shrink(
         index,
         failed: signature(&first),
         may_block,
+        relation,
         options,
     };
     subject.check_property()?;
@@ -237,6 +242,8 @@ struct Subject<'a> {
     failed: BTreeSet<String>,
     /// Whether obstacles may be in the way: the run's own are, or the configuration allows it.
     may_block: bool,
+    /// The change of the relation that must still be broken, instead of a property.
+    relation: Option<SceneChange>,
     options: &'a ShrinkOptions<'a>,
 }
 
@@ -278,8 +285,18 @@ impl Subject<'_> {
             )
             .ok()
         };
-        let record = catch_unwind(AssertUnwindSafe(run)).ok().flatten()?;
-        (record.status == RunStatus::Completed).then_some(record)
+        let related = || {
+            let record = run().filter(|record| record.status == RunStatus::Completed)?;
+            let context = &self.options.context;
+            Some(with_relation(
+                self.env,
+                self.index,
+                self.relation,
+                record,
+                context,
+            ))
+        };
+        catch_unwind(AssertUnwindSafe(related)).ok().flatten()
     }
 
     /// Whether a run fails as required.
@@ -489,6 +506,21 @@ fn remake(
         .help("models, robot or program have changed since the run was made")
         .into()
     })
+}
+
+/// The run with the judgement of a relation instead of its own, if one is asked for.
+fn with_relation(
+    env: &Env,
+    index: u64,
+    relation: Option<SceneChange>,
+    mut record: RunRecord,
+    context: &RunContext,
+) -> RunRecord {
+    if let Some(change) = relation {
+        let judgement = judge_related(env, &record, index, change, context);
+        record.judgements = vec![judgement.into_iter().collect()];
+    }
+    record
 }
 
 fn signature(record: &RunRecord) -> BTreeSet<String> {

@@ -15,7 +15,7 @@ mod search;
 pub(super) use counterexample::SHRUNK;
 pub use counterexample::{Repeat, ShrinkOptions, Shrunk, shrink, store};
 pub use explain::{Explained, Influence, Neighbour, Passing, explain};
-pub(super) use list::drop_rejected_tries;
+pub(crate) use list::drop_rejected_tries;
 pub use list::{Id, ids};
 pub use reduce::{ShrinkPlan, reduce};
 pub use search::{TrialLimits, TrialSearch, Tried, TryResult};

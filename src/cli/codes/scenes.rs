@@ -173,6 +173,12 @@ const CODES_S: &[Code] = &[
         "name a campaign of `actcheck run`",
     ),
     code(
+        "S055",
+        "a campaign has no relations between runs",
+        "its configuration has no `[relations]`",
+        "add `[relations]` with a rule file for each change, and name the file with `--config`",
+    ),
+    code(
         "S060",
         "the scene of a case can't be built",
         "an edited value moved an object onto another one",

@@ -46,11 +46,11 @@ impl<'a> Shapes<'a> {
             return self.sdf_mesh(kind, reader);
         }
         match sdf_primitive(kind, reader)? {
-            Primitive::Geometry(TreeGeometry::Ellipsoid { radii }) => {
+            PrimitiveShape::Geometry(TreeGeometry::Ellipsoid { radii }) => {
                 ellipsoid(radii).map(|mesh| Shape::Mesh { mesh })
             }
-            Primitive::Geometry(geometry) => geometry.solid(),
-            Primitive::Cone { radius, length } => {
+            PrimitiveShape::Geometry(geometry) => geometry.solid(),
+            PrimitiveShape::Cone { radius, length } => {
                 cone(radius, length).map(|mesh| Shape::Mesh { mesh })
             }
         }
@@ -213,7 +213,7 @@ pub(crate) fn kind_of<'n>(geometry: Node<'n>, reader: &mut Reader) -> Option<Nod
 }
 
 /// A shape that is not that of a mesh file.
-pub(crate) enum Primitive {
+pub(crate) enum PrimitiveShape {
     Geometry(TreeGeometry),
     /// With its tip above and its middle at the origin. Units: metres.
     Cone {
@@ -223,7 +223,7 @@ pub(crate) enum Primitive {
 }
 
 /// Reads a primitive of SDF. Returns `None` after it has reported a fault.
-pub(crate) fn sdf_primitive(kind: Node, reader: &mut Reader) -> Option<Primitive> {
+pub(crate) fn sdf_primitive(kind: Node, reader: &mut Reader) -> Option<PrimitiveShape> {
     primitive(kind, reader, |name, reader| {
         let node = reader.required(kind, name)?;
         Some((node, xml::text(node)))
@@ -236,7 +236,7 @@ pub(crate) fn primitive<'n>(
     kind: Node<'n>,
     reader: &mut Reader,
     written: impl Fn(&str, &mut Reader) -> Option<(Node<'n>, &'n str)>,
-) -> Option<Primitive> {
+) -> Option<PrimitiveShape> {
     let number = |reader: &mut Reader, name: &str| {
         let (node, text) = written(name, reader)?;
         reader
@@ -263,7 +263,7 @@ pub(crate) fn primitive<'n>(
             match round {
                 "cylinder" => TreeGeometry::Cylinder { radius, length },
                 "capsule" => TreeGeometry::Capsule { radius, length },
-                _ => return Some(Primitive::Cone { radius, length }),
+                _ => return Some(PrimitiveShape::Cone { radius, length }),
             }
         }
         other => {
@@ -272,7 +272,7 @@ pub(crate) fn primitive<'n>(
             return None;
         }
     };
-    Some(Primitive::Geometry(geometry))
+    Some(PrimitiveShape::Geometry(geometry))
 }
 
 /// Number of faces around a cone or an ellipsoid; from pole to pole, an ellipsoid has half as many.

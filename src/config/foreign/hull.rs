@@ -176,7 +176,7 @@ fn tetrahedron(points: &[[f64; 3]]) -> Option<[u32; 4]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::foreign::test_files::ball;
+    use crate::foreign::files_for_tests::ball;
     use actcheck_data::Mesh;
 
     #[test]

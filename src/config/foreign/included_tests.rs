@@ -1,9 +1,9 @@
 //! Models that include others: circles and growth are refused, and nothing of an included model is
 //! lost.
 
+use crate::foreign::files_for_tests::{folder, sdf, sdf_model as model};
 use crate::foreign::folder::Found;
 use crate::foreign::lookup::Lookup;
-use crate::foreign::test_files::{folder, sdf, sdf_model as model};
 use crate::foreign::{read, robot, world};
 use actcheck_base::{Diagnostics, Files, Source};
 use actcheck_data::{ModelTree, ObjectModel};

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use nalgebra::{Isometry3, Quaternion, UnitQuaternion, Vector3};
 
+use crate::foreign::files_for_tests::{ball, folder};
 use crate::foreign::lookup::Lookup;
-use crate::foreign::test_files::{ball, folder};
 use crate::foreign::{mjcf, mjcf_world};
 use actcheck_base::{Diagnostics, Files, Source};
 use actcheck_data::{ModelTree, Shape, TreeGeometry, TreeJoint, TreeMotion};

@@ -9,6 +9,8 @@ mod body;
 mod building;
 mod collada;
 mod elements;
+#[cfg(test)]
+mod files_for_tests;
 mod folder;
 mod footprint;
 mod frames;
@@ -57,8 +59,6 @@ mod sdf_surface;
 mod solid_mass;
 #[cfg(test)]
 mod stated_tests;
-#[cfg(test)]
-mod test_files;
 mod tree_checks;
 mod tree_object;
 mod urdf;

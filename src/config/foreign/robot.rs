@@ -17,8 +17,8 @@ pub(crate) struct RobotFile {
     pub(crate) tree: ModelTree,
     /// Meshes by their file name in the tree.
     pub(crate) meshes: BTreeMap<String, Vec<Shape>>,
-    /// Digest of what the text alone does not decide: the mesh files and the masses that follow from
-    /// them; `None` for a URDF without collision meshes.
+    /// Digest of the mesh files and of the masses that follow from them, which the text does not
+    /// determine; `None` for a URDF without collision meshes.
     digest: Option<String>,
     /// The text with all that it includes.
     pub(crate) text: Source,

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Matrix3};
 
 use crate::foreign::body::{Mass, is_possible};
 use crate::foreign::elements::Children;
-use crate::foreign::geometry::{Primitive, kind_of, sdf_primitive};
+use crate::foreign::geometry::{PrimitiveShape, kind_of, sdf_primitive};
 use crate::foreign::sdf_pose::pose;
 use crate::foreign::solid_mass::SolidMass;
 use crate::foreign::xml::{self, Bound, Node, Reader};
@@ -215,7 +215,7 @@ fn of_geometry(solid: &CollisionSolid, reader: &mut Reader) -> Option<SolidMass>
         return SolidMass::of_shape(&solid.shape);
     }
     Some(match sdf_primitive(kind, reader)? {
-        Primitive::Geometry(geometry) => SolidMass::of_primitive(&geometry),
-        Primitive::Cone { radius, length } => SolidMass::of_cone(radius, length),
+        PrimitiveShape::Geometry(geometry) => SolidMass::of_primitive(&geometry),
+        PrimitiveShape::Cone { radius, length } => SolidMass::of_cone(radius, length),
     })
 }

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Matrix3};
 
 use crate::foreign::body::Role;
 use crate::foreign::elements::{Children, refuse_switch};
-use crate::foreign::geometry::{Primitive, Shapes, check_scale, cone, kind_of, sdf_primitive};
+use crate::foreign::geometry::{PrimitiveShape, Shapes, check_scale, cone, kind_of, sdf_primitive};
 use crate::foreign::sdf_inertial::{self, CollisionSolid, INERTIAL};
 use crate::foreign::sdf_link::{COLLISION, LINK, check_drag};
 use crate::foreign::sdf_pose::pose;
@@ -117,8 +117,8 @@ fn solid(
         mesh(kind, file, reader)?
     } else {
         match sdf_primitive(kind, reader)? {
-            Primitive::Geometry(geometry) => geometry,
-            Primitive::Cone { radius, length } => {
+            PrimitiveShape::Geometry(geometry) => geometry,
+            PrimitiveShape::Cone { radius, length } => {
                 let name = node.attribute("name").unwrap_or_default();
                 let name = format!("{link} {name} ({})", meshes.len());
                 meshes.insert(name.clone(), cone(radius, length)?);

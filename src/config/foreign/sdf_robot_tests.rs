@@ -5,8 +5,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::foreign::Lookup;
+use crate::foreign::files_for_tests::{folder, sdf};
 use crate::foreign::robot::{self, RobotFile};
-use crate::foreign::test_files::{folder, sdf};
 use actcheck_base::{Diagnostics, Files};
 use actcheck_data::{ModelTree, TreeMotion};
 

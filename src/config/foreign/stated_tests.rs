@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use nalgebra::Point3;
 
+use crate::foreign::files_for_tests::{folder, sdf_model as sdf};
 use crate::foreign::folder::Read;
-use crate::foreign::test_files::{folder, sdf_model as sdf};
 use crate::foreign::world::{self, WorldModels};
 use crate::foreign::{Lookup, find, read};
 use actcheck_base::{Files, Source};

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use crate::foreign::geometry::{Primitive, check_scale, cone, kind_of, primitive};
+use crate::foreign::geometry::{PrimitiveShape, check_scale, cone, kind_of, primitive};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostics, did_you_mean};
 use actcheck_data::{
@@ -309,8 +309,8 @@ fn read_geometry(
     }
     let written = |name: &str, reader: &mut Reader| Some((kind, reader.attribute(kind, name)?));
     match primitive(kind, reader, written)? {
-        Primitive::Geometry(geometry) => Some(geometry),
-        Primitive::Cone { radius, length } => {
+        PrimitiveShape::Geometry(geometry) => Some(geometry),
+        PrimitiveShape::Cone { radius, length } => {
             let name = format!("cone {}", meshes.len());
             meshes.insert(name.clone(), cone(radius, length)?);
             Some(TreeGeometry::Mesh {

@@ -11,7 +11,7 @@ use crate::merge::plan::{MergePlan, PlannedEnd, PlannedMerge};
 use crate::merge::survey::identity;
 use crate::segment::{LaterJudgement, RunContent, Segment, SegmentColumn, copy_column};
 use crate::writers::next_segment;
-use crate::{FAILED_AGAIN, History, fault};
+use crate::{FAILED_AGAIN, History, RELATED, RelatedPair, fault};
 use actcheck_base::Diagnostics;
 
 /// The result of a merge.
@@ -62,6 +62,7 @@ pub fn carry_out(
         into.segments.close(&into.stored.folder, &campaign.id)?;
         writer.end(campaign)?;
     }
+    writer.add_companions()?;
     Ok(writer.merged)
 }
 
@@ -79,11 +80,10 @@ impl NewIds {
     /// The new name of a campaign, which may end in the id of a shrunk run, or of a campaign whose
     /// failed runs were run again.
     fn of_name(&self, name: &str) -> String {
-        if let Some(new) = name
-            .strip_prefix(FAILED_AGAIN)
-            .and_then(|old| self.0.get(old))
-        {
-            return format!("{FAILED_AGAIN}{new}");
+        for prefix in [FAILED_AGAIN, RELATED] {
+            if let Some(new) = name.strip_prefix(prefix).and_then(|old| self.0.get(old)) {
+                return format!("{prefix}{new}");
+            }
         }
         let renamed = name
             .rsplit_once(' ')
@@ -100,6 +100,47 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
+    /// Adds the files about the campaigns: cross-checks and pairs of runs. What the destination
+    /// has already stays.
+    fn add_companions(&self) -> Result<(), Diagnostics> {
+        for (source, ids) in self.sources.iter().zip(&self.new_ids) {
+            let of_run = |run: &str| ids.of_run(run).unwrap_or_else(|| run.to_owned());
+            for (old, new) in &ids.0 {
+                if let Some(mut check) = source.cross_check(old)? {
+                    check.campaign.clone_from(new);
+                    check.imported = check
+                        .imported
+                        .map(|id| ids.0.get(&id).cloned().unwrap_or(id));
+                    let runs = std::mem::take(&mut check.runs).into_iter();
+                    check.runs = runs.map(|(run, flips)| (of_run(&run), flips)).collect();
+                    if let Some(known) = self.into.cross_check(new)? {
+                        check.runs.extend(known.runs);
+                    }
+                    self.into.store_cross_check(&check)?;
+                }
+                if let Some(mut related) = source.related(old)? {
+                    related.campaign.clone_from(new);
+                    for pair in &mut related.pairs {
+                        pair.run = of_run(&pair.run);
+                        pair.second = pair.second.as_deref().map(of_run);
+                    }
+                    if let Some(known) = self.into.related(new)? {
+                        let is_known = |pair: &RelatedPair| {
+                            let mut pairs = known.pairs.iter();
+                            pairs.any(|other| {
+                                (&other.run, &other.relation) == (&pair.run, &pair.relation)
+                            })
+                        };
+                        related.pairs.retain(|pair| !is_known(pair));
+                        related.pairs.extend(known.pairs);
+                    }
+                    self.into.store_related(&related)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// Writes a campaign without its end, so that readers see it as unfinished.
     fn begin(&self, campaign: &PlannedMerge) -> Result<(), Diagnostics> {
         let work = &campaign.work;

@@ -11,6 +11,7 @@ mod health;
 mod labels;
 mod oracles;
 mod recheck;
+mod relations;
 mod render;
 mod shrunk;
 
@@ -24,5 +25,6 @@ pub use health::health_table;
 pub use labels::labels_table;
 pub use oracles::oracles_table;
 pub use recheck::recheck_table;
+pub use relations::relations_table;
 pub use render::{Table, TableFormat, TableParts};
 pub use shrunk::with_shrunk;

@@ -151,7 +151,7 @@ def _mark(recorder: Recorder, run: Run, tick: int, grips: _Grips) -> None:
 
 
 def _mark_end(recorder: Recorder, action: dict[str, Any], grips: _Grips) -> None:
-    """Records the end of an action with the robot's own report. It is no success if the robot held an object here, and holds none there."""
+    """Records the end of an action with the robot's own report. It is a failure if the robot held an object here, and holds none there."""
     reported, message = action["reported"], action["message"]
     if reported and action["holds"] and not grips.hold():
         reported, message = False, "the fingers hold nothing"
