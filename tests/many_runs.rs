@@ -313,6 +313,7 @@ fn a_report_with_a_sample_filters_all_runs() {
         words: &Default::default(),
         replays: &Replays::default(),
         contested: &Default::default(),
+        relations: &[],
     });
     let file = folder.path().join("report.html");
     std::fs::write(&file, page).unwrap();

@@ -20,6 +20,7 @@ mod findings;
 mod fisher;
 mod health;
 mod holm;
+mod mined;
 mod oracles;
 mod paired;
 mod patterns;
@@ -60,6 +61,7 @@ pub use findings::{
 pub use fisher::{FisherTest, TwoByTwo};
 pub use health::{Health, HealthMeter, HealthProblem};
 pub use holm::holm;
+pub use mined::{Beyond, MinedLimit};
 pub use oracles::{
     LEVEL, Notice, OracleCell, OracleGap, OracleMatrix, OracleRow, OracleTrial, oracle_matrix,
 };

@@ -22,6 +22,7 @@ mod import;
 mod last_failed;
 mod line;
 mod make_run;
+pub mod mining;
 mod mjcf;
 pub mod oracles;
 mod outcome;

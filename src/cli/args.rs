@@ -303,6 +303,18 @@ pub enum Command {
     /// interrupted by Ctrl-C.
     #[command(after_help = "Example:\n  actcheck relate k7f3 --config configs/pick_relations.toml")]
     Relate(crate::relate::RelateArgs),
+    /// Propose properties: limits, durations and orders that all passing runs keep
+    ///
+    /// Limits are fitted to two of three passing runs of a campaign. A property is proposed only if
+    /// the third ones keep it too (at most one of a hundred does not), and if it notices a fault: one
+    /// that is injected into fresh scenes, as `check-oracles` does, or a run that people labelled as
+    /// bad. The rule files have the evidence as comments; they are to be read and edited.
+    ///
+    /// Exit code: 0 something was proposed, 1 nothing, 2 it failed, 130 interrupted by Ctrl-C.
+    #[command(
+        after_help = "Example:\n  actcheck propose-properties configs/.actcheck    (after `actcheck run configs/pick.toml --runs 300`)"
+    )]
+    ProposeProperties(crate::propose_properties::ProposePropertiesArgs),
     /// Compare verdicts with people's labels: agreement, limits that fit better, likely wrong labels
     ///
     /// For each property with labels: how often its verdict agrees, and whether another limit in its

@@ -72,6 +72,7 @@ pub fn run(sources_digest: &'static str) -> ExitCode {
         Command::Shrink(args) => shrink::shrink(&args),
         Command::Query(args) => query::query(&args),
         Command::Relate(args) => crate::relate::relate(&args),
+        Command::ProposeProperties(args) => crate::propose_properties::propose_properties(&args),
         Command::Recheck(args) => recheck::recheck(&args),
         Command::Why(args) => stop::interruptible(|stop| why::why(&args, stop).map(|()| 0)),
         Command::New(args) => new::new(&args).map(|()| 0),

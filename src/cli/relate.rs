@@ -88,6 +88,7 @@ pub fn pairs_of(
 ) -> Result<RelatedRuns, Diagnostics> {
     let options = RelateOptions {
         runs: runs.map(|runs| runs as usize),
+        only: None,
         jobs,
         context: RunContext {
             clock: clock::system(),

@@ -9,7 +9,10 @@ use crate::{clock, replayed_runs, work};
 use actcheck_base::Diagnostics;
 use actcheck_history::History;
 use actcheck_ontology::{Ontology, RuleLanguage};
-use actcheck_report::{HtmlReport, PackedRuns, PropertyWords, Replays, html, replay_order};
+use actcheck_report::{
+    FindingsSummary, HtmlReport, PackedRuns, PropertyWords, RelationsSummary, Replays, html,
+    replay_order,
+};
 
 /// Renders the whole page, with as many replays as fit into `room` bytes.
 ///
@@ -39,7 +42,26 @@ pub(super) fn page(found: &Analysed, history: &History, room: f64) -> Result<Str
         words: &words(ontology),
         replays: &replays,
         contested: &history.contested()?,
+        relations: &relations(history, summary)?,
     }))
+}
+
+/// The relations of the campaigns in a report.
+fn relations(
+    history: &History,
+    summary: &FindingsSummary,
+) -> Result<Vec<RelationsSummary>, Diagnostics> {
+    let mut found = Vec::new();
+    for campaign in &summary.campaigns {
+        if let Some(related) = history.related(campaign)? {
+            found.push(RelationsSummary {
+                related,
+                history: summary.history.clone(),
+                program: summary.program.clone(),
+            });
+        }
+    }
+    Ok(found)
 }
 
 fn words(ontology: &Ontology) -> BTreeMap<String, PropertyWords> {

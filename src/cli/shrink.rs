@@ -12,7 +12,8 @@ use crate::work::{all_cores, quietly};
 use crate::{clock, history_dir, output, restore, stop, trust};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign::shrink::{self, Id, Repeat, ShrinkOptions, Shrunk};
-use actcheck_campaign::{Env, RunContext};
+use actcheck_campaign::{Env, RelateOptions, RunContext, relate};
+use actcheck_config::SceneChange;
 use actcheck_data::Choice;
 use actcheck_history::{History, RunRecord};
 use actcheck_report::{PassingValue, ShrunkChoice, ShrunkSummary, Table, shrunk_json, shrunk_text};
@@ -24,8 +25,8 @@ use serde_json::Value;
 pub struct ShrinkArgs {
     /// Id of the run, or a unique prefix
     pub run: String,
-    /// The property that must still fail, by its name in the ontology [default: exactly those that
-    /// failed]
+    /// The property that must still fail, by its name in the ontology, or the relation that must
+    /// still be broken, by its key in `[relations]` [default: exactly the properties that failed]
     #[arg(long, value_name = "PROPERTY")]
     pub property: Option<String>,
     /// Maximum number of simulations, including those for the explanation
@@ -195,7 +196,10 @@ fn summary(
             .neighbour
             .as_ref()
             .map(|near| (shown(&near.id), passing_value(&near.passing))),
-        why: why(env, record, &shrunk)?,
+        why: match shrunk.relation {
+            Some(relation) => vec![pair_text(env, history, record, relation)?],
+            None => why(env, record, &shrunk)?,
+        },
         failed: shrunk.failed.into_iter().collect(),
         others_before: shrunk.others_before,
         special_before: shrunk.special_before,
@@ -266,6 +270,31 @@ fn passing_value(passing: &shrink::Passing) -> PassingValue {
         value: passing.value,
         others: passing.others.clone(),
     }
+}
+
+/// Makes the pair of a shrunk run, stores it, and says why its relation does not hold.
+fn pair_text(
+    env: &Env,
+    history: &History,
+    record: &RunRecord,
+    relation: SceneChange,
+) -> Result<String, Diagnostics> {
+    let options = RelateOptions {
+        runs: None,
+        only: Some(relation.word()),
+        jobs: 1,
+        context: RunContext {
+            clock: clock::system(),
+            disturb: None,
+        },
+        stop: &|| false,
+    };
+    let related = relate(env, history, &record.campaign, &options, || {})?;
+    let texts = related.pairs.iter().map(|pair| {
+        let second = pair.second.as_deref().unwrap_or("no second run");
+        format!("{} and {second}: {}", pair.run, pair.witness)
+    });
+    Ok(texts.collect::<Vec<_>>().join("\n"))
 }
 
 /// The explanation of each property that fails.

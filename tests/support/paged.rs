@@ -87,5 +87,6 @@ pub fn page(
         words,
         replays,
         contested: &BTreeMap::new(),
+        relations: &[],
     })
 }

@@ -23,6 +23,8 @@ const AT_ONCE: usize = 64;
 pub struct RelateOptions<'a> {
     /// Number of runs with partners, the first ones of the campaign; `None`: all.
     pub runs: Option<usize>,
+    /// The only relation whose pairs are made; `None`: all.
+    pub only: Option<&'a str>,
     /// Number of workers; does not affect results.
     pub jobs: usize,
     /// How runs are made.
@@ -81,6 +83,7 @@ pub fn relate(
                 .map(|relation| relation.change);
             changes.map(move |change| Order { row, change })
         })
+        .filter(|order| options.only.is_none_or(|only| only == order.change.word()))
         .filter(|order| !is_known(&order.row.run, order.change))
         .collect();
     let mut pairs = known;

@@ -79,6 +79,8 @@ pub struct Shrunk {
     /// Whether recorded noise was used, because with fresh noise the run does not fail often
     /// enough.
     pub noise_kept: bool,
+    /// The change of the relation that is broken, if one was asked for.
+    pub relation: Option<SceneChange>,
 }
 
 /// Finds the smallest scene that fails as a run did. `recorded` are the run's choices, `index` is
@@ -166,6 +168,7 @@ pub fn shrink(
         (explained, explaining) = (confirmed, explaining + replays);
     }
     Ok(Shrunk {
+        relation,
         fresh,
         choices,
         failed: subject.failed,

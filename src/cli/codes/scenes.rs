@@ -179,6 +179,12 @@ const CODES_S: &[Code] = &[
         "add `[relations]` with a rule file for each change, and name the file with `--config`",
     ),
     code(
+        "S056",
+        "no property can be proposed from a campaign",
+        "it was imported, so that no fault can be injected into its runs, and there are no labels",
+        "label its runs, good ones and bad ones, and name the file with `--labels`",
+    ),
+    code(
         "S060",
         "the scene of a case can't be built",
         "an edited value moved an object onto another one",

@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::FindingsSummary;
 use crate::html::{PackedRuns, Replays};
+use crate::{FindingsSummary, RelationsSummary};
 use actcheck_analysis::OutcomeTable;
 use actcheck_base::DecidingSignal;
 use actcheck_history::CampaignRow;
@@ -30,6 +30,8 @@ pub struct HtmlReport<'a> {
     /// Runs whose verdict another physics engine contests, each with the local names of the
     /// properties that it decides otherwise.
     pub contested: &'a BTreeMap<String, BTreeSet<String>>,
+    /// The relations between pairs of runs, of each campaign that has some.
+    pub relations: &'a [RelationsSummary],
 }
 
 /// Names and descriptions of a property.

@@ -9,11 +9,15 @@ use crate::html::HtmlReport;
 use crate::html::columns::{Slot, Slots};
 use crate::html::pack::Pack;
 use crate::json::findings_with;
-use crate::{RateBounds, scene_rule};
+use crate::summary::RelationSummary;
+use crate::{RateBounds, RelationsSummary, scene_rule};
 use actcheck_analysis::{FailureMode, Sampling, score_interval};
 use actcheck_base::{Outcome, ShellLine, names};
-use actcheck_history::{CampaignRow, SkillRecord};
+use actcheck_history::{CampaignRow, RelatedPair, SkillRecord};
 use actcheck_verdict::mean;
+
+/// Maximum number of pairs of each relation on the page; `actcheck relate --format json` has all.
+const MOST_PAIRS: usize = 5;
 
 /// Packs findings, campaigns and properties. Runs are referred to by index.
 pub(super) fn summary(report: &HtmlReport<'_>, slots: &Slots) -> String {
@@ -50,6 +54,13 @@ pub(super) fn summary(report: &HtmlReport<'_>, slots: &Slots) -> String {
         .filter(|(run, _)| places.contains_key(run.as_str()))
         .collect();
     pack.set("contested", json!(contested));
+    let relations = report.relations.iter();
+    pack.set(
+        "relations",
+        relations
+            .flat_map(|of_campaign| relations_of(of_campaign, &places))
+            .collect::<Vec<Value>>(),
+    );
     pack.set("campaigns", shown.map(campaign).collect::<Vec<Value>>());
     pack.set(
         "slots",
@@ -68,6 +79,31 @@ pub(super) fn summary(report: &HtmlReport<'_>, slots: &Slots) -> String {
             .collect::<Vec<&str>>(),
     );
     pack.finish()
+}
+
+/// The relations of a campaign, each with the first pairs in which it does not hold. A run is its
+/// index, or its id if it is not in the page.
+fn relations_of(of: &RelationsSummary, places: &FxHashMap<&str, usize>) -> Vec<Value> {
+    let shown = |relation: &RelationSummary<'_>| {
+        let pairs = relation.violated.iter().take(MOST_PAIRS);
+        let pair = |pair: &&RelatedPair| {
+            json!({
+                "run": pair.run, "place": places.get(pair.run.as_str()), "second": pair.second,
+                "because": pair.witness, "shrink": of.shrink(pair).to_string(),
+            })
+        };
+        let holds = relation.kept.interval().map(|interval| {
+            let rate = relation.kept.agree as f64 / relation.kept.of as f64;
+            json!({ "rate": rate, "low": interval.low, "high": interval.high })
+        });
+        json!({
+            "campaign": of.related.campaign, "relation": relation.name, "holds": holds,
+            "kept": relation.kept.agree, "of": relation.kept.of,
+            "inapplicable": relation.inapplicable, "violated": relation.violated.len(),
+            "pairs": pairs.map(pair).collect::<Vec<Value>>(),
+        })
+    };
+    of.relations().iter().map(shown).collect()
 }
 
 /// The failure modes, each with the number of its runs and an example, with a replay if there is

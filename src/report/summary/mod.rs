@@ -36,6 +36,7 @@ pub use oracles::OracleSummary;
 pub(crate) use oracles::notice_word;
 pub(crate) use recheck::reason_text;
 pub use recheck::{ChangeReason, RecheckChange, RecheckLine, RecheckSummary};
+pub(crate) use relations::RelationSummary;
 pub use relations::RelationsSummary;
 pub use remarks::{Oddity, Remark};
 pub use repeated::RepeatedProperty;

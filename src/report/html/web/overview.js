@@ -29,6 +29,7 @@ function overview(report) {
         scores.all_passed ? `[${(scores.all_passed.low * 100).toFixed(0)}–${(scores.all_passed.high * 100).toFixed(0)}] · ${count(scores.passed)} of ${counted(scores.tested, "run")} that tested anything` : "no run tested anything", scores.all_passed)),
     make("section", { class: "card" }, make("h2", {}, "Properties"), propertyTable(summary),
       make("p", { class: "more" }, make("a", { href: "#/properties" }, "margins and heat maps →"))),
+    summary.relations.length > 0 && make("section", { class: "card" }, make("h2", {}, "Relations between runs"), relationTable(summary), brokenPairs(report)),
     make("div", { class: "columns" },
       make("section", {}, make("h2", {}, "Failure modes"), modeBars(report, 6),
         make("p", { class: "more" }, make("a", { href: "#/modes" }, "all failure modes →"))),
@@ -48,6 +49,27 @@ function propertyTable(summary) {
         make("small", {}, `${local(property.action)} `), breakable(local(property.property)))),
       make("td", {}, rateCell(passing(property), "passed")),
       OUTCOMES.map((word) => make("td", { class: property.outcomes[word] ? "" : "faint" }, count(property.outcomes[word]))))))));
+}
+
+/** One row for each relation: how often it holds for a run and the same scene with one change. */
+function relationTable(summary) {
+  return scroller("Relations between runs", make("table", { class: "properties" },
+    make("thead", {}, make("tr", {}, ["relation", "holds [95 %]", "pairs", "inapplicable"].map((head) => make("th", { scope: "col" }, head)))),
+    make("tbody", {}, summary.relations.map((relation) => make("tr", {},
+      make("th", { scope: "row" }, make("small", {}, `${relation.campaign} `), breakable(relation.relation)),
+      make("td", {}, rateCell(relation.holds, "passed")),
+      make("td", {}, `${count(relation.kept)} of ${count(relation.of)}`),
+      make("td", { class: relation.inapplicable ? "" : "faint" }, count(relation.inapplicable)))))));
+}
+
+/** The first pairs in which a relation does not hold, and the command that finds the smallest scene. */
+function brokenPairs({ runs, to, summary }) {
+  const pairs = summary.relations.flatMap((relation) => relation.pairs.map((pair) => ({ ...pair, relation: relation.relation })));
+  const more = summary.relations.reduce((sum, relation) => sum + relation.violated, 0) - pairs.length;
+  if (!pairs.length) return null;
+  const first = (pair) => pair.place === null ? pair.run : make("a", { href: to(pair.place) }, runs.id(pair.place));
+  return [make("ul", { class: "sentences" }, pairs.map((pair) => make("li", {}, `${pair.relation} does not hold for `, first(pair), ` and ${pair.second}: ${pair.because}. `,
+    make("code", {}, pair.shrink)))), more > 0 && make("p", { class: "faint" }, `${counted(more, "more pair")}: actcheck relate --format json`)];
 }
 
 function patternList(summary, most) {
