@@ -218,7 +218,7 @@ impl ByHand {
 /// hold position 0.
 fn insert_robot(world: &mut engine::PhysicsWorld, scene: &Scene) {
     let robot =
-        urdf_rs::read_from_string(&scene.robot.profile.urdf.text).expect("the shipped robot");
+        urdf_rs::read_from_string(&scene.robot.profile.core.urdf.text).expect("the shipped robot");
     let links: BTreeMap<&str, &urdf_rs::Link> = robot
         .links
         .iter()
@@ -423,7 +423,7 @@ fn written(scene: &Scene, rates: &[f64; 4]) -> Value {
         "robot_base": scene.robot.base,
         "steps_per_second": scene.physics.steps_per_second,
         "iterations": scene.physics.iterations,
-        "robot": scene.robot.profile.urdf.text.as_ref() as &str,
+        "robot": scene.robot.profile.core.urdf.text.as_ref() as &str,
         "objects": objects.collect::<Vec<_>>(),
         "rates": {"actcheck": rates[0], "rapier3d by hand": rates[2], "rapier3d by hand, nothing sleeps": rates[3]},
     })

@@ -108,7 +108,7 @@ fn of_pick() -> usize {
     let robot = env(root(), 1).campaign.robot;
     FAULTS
         .iter()
-        .filter(|fault| fault.concerns(&[Step::plain("Pick")], &robot))
+        .filter(|fault| fault.concerns(&[Step::plain("Pick")], &robot.core))
         .count()
 }
 
@@ -193,9 +193,9 @@ fn faults_that_a_robot_can_not_have_are_left_out() {
             .robot
     });
     let pick = [Step::plain("Pick")];
-    let left_out = FAULTS
-        .iter()
-        .filter(|fault| fault.concerns(&pick, &robots[0]) && !fault.concerns(&pick, &robots[1]));
+    let left_out = FAULTS.iter().filter(|fault| {
+        fault.concerns(&pick, &robots[0].core) && !fault.concerns(&pick, &robots[1].core)
+    });
     assert_eq!(
         left_out.map(|fault| fault.name).collect::<Vec<_>>(),
         ["base-pushed", "arm-through-head"]
@@ -313,7 +313,7 @@ fn the_drive_notices_an_object_that_is_lost_or_pushes_another() {
     assert!(
         faults
             .iter()
-            .all(|fault| !fault.concerns(&drives, &env.campaign.robot))
+            .all(|fault| !fault.concerns(&drives, &env.campaign.robot.core))
     );
 }
 

@@ -110,6 +110,7 @@ fn shipped_files_are_the_defaults() {
     assert_eq!(
         campaign
             .robot
+            .core
             .urdf
             .name
             .strip_prefix("built-in:")

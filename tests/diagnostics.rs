@@ -55,6 +55,6 @@ fn all_mismatches_of_configuration_and_ontology_are_reported_at_once() {
     check("scenario", 6, |path| {
         let campaign = config::load(path, &Overrides::default())?;
         let ontology = ontology::load(&campaign.ontology.0, &campaign.ontology.1)?;
-        Space::new(&campaign, &ontology).map(drop)
+        Space::check(&campaign, &ontology)
     });
 }

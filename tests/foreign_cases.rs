@@ -177,11 +177,11 @@ fn wrong_values(expected: &Expected, folder: &Path) -> Vec<String> {
 }
 
 fn wrong_robot(wanted: &Robot, env: &Env) -> Vec<String> {
-    let robot = &env.campaign.robot;
+    let robot = &env.robot.profile;
     let mut faults = Vec::new();
     for (wanted, found) in [
         (&wanted.arm, &robot.arm_joints),
-        (&wanted.fingers, &robot.finger_joints),
+        (&wanted.fingers, &robot.hand.finger_joints),
     ] {
         if wanted.as_ref().is_some_and(|wanted| wanted != found) {
             faults.push(format!("the robot has {found:?}"));
@@ -193,13 +193,13 @@ fn wrong_robot(wanted: &Robot, env: &Env) -> Vec<String> {
         &mut faults,
         (of, "grip force"),
         force,
-        [robot.grip_force_n; 3],
+        [robot.hand.grip_force_n; 3],
     );
     let measured = env.robot.measures();
     let mass = wanted.mass_kg.map(|kg| [kg; 3]);
     compare(&mut faults, (of, "mass"), mass, [measured.mass_kg; 3]);
     for (name, effort) in &wanted.effort {
-        let joint = robot.tree.joint(name);
+        let joint = robot.core.tree.joint(name);
         let joint = joint.unwrap_or_else(|| panic!("there is no joint {name}"));
         compare(
             &mut faults,

@@ -6,6 +6,7 @@
 //! --nocapture`
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use actcheck::analysis::Mirror;
@@ -361,8 +362,9 @@ fn robots() {
         );
         match read {
             Ok(campaign) => {
-                if let Err(error) =
-                    world::Robot::compile(&campaign.robot).and_then(|robot| robot.check())
+                if let Err(error) = world::complete(&campaign.robot)
+                    .and_then(|found| world::Robot::compile(&Arc::new(found.profile)))
+                    .and_then(|robot| robot.check())
                 {
                     show(&error.diagnostic().into());
                 }

@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use actcheck::base::{Diagnostics, Judgement, Outcome, RunFacts, Source, Term, digest_of, names};
 use actcheck::data::{
-    ActionEnd, Camera, Choice, ChoiceKind, CupState, ObjectModel, Odometry, Physics, Pose, Quality,
-    RobotProfile, RobotStart, Role, Scene, SceneObject, Sensing,
+    ActionEnd, Camera, Choice, ChoiceKind, CupState, Hand, LinkFrame, ObjectModel, Odometry,
+    Physics, Pose, Quality, RobotCore, RobotProfile, RobotStart, Role, Scene, SceneObject, Sensing,
 };
 use actcheck::facts::extract;
 use actcheck::history::RunScene;
@@ -42,7 +42,12 @@ fn model(name: &str) -> Arc<ObjectModel> {
 }
 
 fn robot() -> Arc<RobotProfile> {
-    Arc::new(RobotProfile {
+    let none = LinkFrame {
+        link: String::new(),
+        offset_m: [0.0; 3],
+        turned_rad: [0.0; 3],
+    };
+    let core = RobotCore {
         name: "mobile manipulator".to_owned(),
         urdf: Source::new("robot.urdf", "<robot/>"),
         tree: Arc::default(),
@@ -52,28 +57,29 @@ fn robot() -> Arc<RobotProfile> {
         mount_turned_rad: 0.0,
         on_surface: false,
         reach_m: None,
-        arm_joints: Vec::new(),
-        finger_joints: vec![String::new(), String::new()],
         head_joints: Vec::new(),
         other_joints: Vec::new(),
         parked: Vec::new(),
         no_collision_links: Vec::new(),
-        grasp_link: String::new(),
-        grasp_turned_rad: [0.0; 3],
-        camera_turned_rad: [0.0; 3],
-        camera_offset_m: [0.0; 3],
-        grasp_offset_m: [0.0; 3],
-        finger_links: [String::new(), String::new()],
-        camera_link: String::new(),
-        max_opening_m: 0.135,
-        home: Vec::new(),
-        postures: Vec::new(),
-        finger_friction: 1.0,
-        grip_force_n: 10.0,
-        suction: None,
         meshes: BTreeMap::new(),
         surfaces: BTreeMap::new(),
         digest: String::new(),
+    };
+    Arc::new(RobotProfile {
+        core,
+        arm_joints: Vec::new(),
+        hand: Hand {
+            grasp: none.clone(),
+            finger_joints: vec![String::new(), String::new()],
+            finger_links: [String::new(), String::new()],
+            max_opening_m: 0.135,
+            finger_friction: 1.0,
+            grip_force_n: 10.0,
+            suction: None,
+        },
+        camera: none,
+        home: Vec::new(),
+        postures: Vec::new(),
     })
 }
 

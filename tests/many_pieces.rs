@@ -37,8 +37,12 @@ fn cut(urdf: &str) -> String {
 
 /// The robot with another URDF.
 fn changed(profile: &RobotProfile, change: impl Fn(&str) -> String) -> Arc<RobotProfile> {
-    let urdf = Source::new("changed.urdf", change(&profile.urdf.text));
-    Arc::new(actcheck::config::robot::with_urdf(profile.clone(), urdf).expect("it is a URDF"))
+    let urdf = Source::new("changed.urdf", change(&profile.core.urdf.text));
+    let core = actcheck::config::robot::with_urdf(profile.core.clone(), urdf);
+    Arc::new(RobotProfile {
+        core: core.expect("it is a URDF"),
+        ..profile.clone()
+    })
 }
 
 /// The scene with the robot's fingers cut.
@@ -235,8 +239,9 @@ fn only_fast_things_are_swept_beside_fingers_of_many_pieces() {
 /// The shipped arm with its root on the table.
 fn arm_on_a_table() -> Scene {
     let path = Path::new("models/robots/fixed_arm.toml");
-    let profile =
+    let stated =
         actcheck::config::robot::read(&Files::Shipped, path).expect("the shipped robot is right");
+    let profile = stated.complete().expect("it states all roles");
     let mut scene = on_table(block([0.06, 0.06, 0.15]), 0.3, 0.5);
     scene.robot.profile = Arc::new(profile);
     (scene.robot.base, scene.robot.root_height_m) = ([0.3, 0.0, 0.0], 0.69);
@@ -248,15 +253,15 @@ fn arm_on_a_table() -> Scene {
 #[test]
 fn links_that_are_hardly_apart_leave_only_their_motion_to_the_engine() {
     let mut scene = arm_on_a_table();
-    let profile = (*scene.robot.profile).clone();
+    let mut profile = (*scene.robot.profile).clone();
     let bar = "<collision><origin xyz=\"0.0179 0 0.2\"/><geometry><box size=\"0.01 0.3 0.01\"/></geometry></collision>";
-    let text = profile.urdf.text.replace(
+    let text = profile.core.urdf.text.replace(
         "<link name=\"wrist_pitch_link\">",
         &format!("<link name=\"wrist_pitch_link\">{bar}"),
     );
     assert!(text.contains(bar));
     let urdf = Source::new("bar.urdf", text);
-    let profile = actcheck::config::robot::with_urdf(profile, urdf).expect("it is a URDF");
+    profile.core = actcheck::config::robot::with_urdf(profile.core, urdf).expect("it is a URDF");
     scene.robot.profile = Arc::new(profile);
     let mut world = build(&scene).expect("the scene is right");
     assert!(world.settle().settled);

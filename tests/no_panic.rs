@@ -9,6 +9,8 @@ use actcheck::data::Choices;
 use actcheck::ontology;
 use actcheck::scenario::{self, Space};
 
+use crate::support::robot_of;
+
 /// Renders the diagnostics as the program prints them.
 fn show(found: &Diagnostics) {
     let handler = miette::GraphicalReportHandler::new_themed(miette::GraphicalTheme::none());
@@ -68,7 +70,7 @@ fn garbled_configurations_do_not_panic() {
         std::fs::write(&path, garbled(&text, number)).unwrap();
         match config::load(&path, &Overrides::default()) {
             Err(found) => show(&found),
-            Ok(campaign) => match Space::new(&campaign, &ontology) {
+            Ok(campaign) => match Space::new(&campaign, &ontology, &robot_of(&campaign)) {
                 Err(found) => show(&found),
                 Ok(space) => {
                     accepted += 1;

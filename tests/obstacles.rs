@@ -13,7 +13,7 @@ use actcheck::data::{
 use actcheck::ontology;
 use actcheck::scenario::{self, Space};
 
-use crate::support::{COARSEST, project, root};
+use crate::support::{COARSEST, project, robot_of, root};
 
 /// Radius of a slim base with its safety distance. Unit: metres.
 const STOPS_M: f64 = 0.35;
@@ -23,7 +23,7 @@ fn space_of(path: &Path) -> Space {
         config::load(path, &Overrides::default()).unwrap_or_else(|found| panic!("{found}"));
     let ontology = ontology::load(&campaign.ontology.0, &campaign.ontology.1)
         .unwrap_or_else(|found| panic!("{found}"));
-    Space::new(&campaign, &ontology).unwrap_or_else(|found| panic!("{found}"))
+    Space::new(&campaign, &ontology, &robot_of(&campaign)).unwrap_or_else(|found| panic!("{found}"))
 }
 
 /// The shipped task, with a change of its text.

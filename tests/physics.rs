@@ -26,9 +26,9 @@ const PERFECT: Sensing = Sensing {
 
 fn robot() -> Arc<RobotProfile> {
     let path = Path::new("models/robots/mobile_manipulator.toml");
-    Arc::new(
-        actcheck::config::robot::read(&Files::Shipped, path).expect("the shipped robot is right"),
-    )
+    let stated =
+        actcheck::config::robot::read(&Files::Shipped, path).expect("the shipped robot is right");
+    Arc::new(stated.complete().expect("it states all roles"))
 }
 
 pub(crate) fn shipped(name: &str) -> Arc<ObjectModel> {
@@ -370,7 +370,8 @@ pub(crate) fn on_table(model: Arc<ObjectModel>, mass_kg: f64, friction: f64) -> 
 fn a_grip_holds_below_its_friction_limit_and_slips_above_it() {
     let (friction, profile) = (0.2_f64, robot());
     let limit_kg =
-        2.0 * (friction * profile.finger_friction).sqrt() * profile.grip_force_n / GRAVITY;
+        2.0 * (friction * profile.hand.finger_friction).sqrt() * profile.hand.grip_force_n
+            / GRAVITY;
     for (share, holds) in [(0.85, true), (1.12, false)] {
         let trace = pick(
             &on_table(block([0.06, 0.06, 0.15]), share * limit_kg, friction),

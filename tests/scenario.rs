@@ -10,12 +10,14 @@ use parry3d::math::{Pose as ParryPose, Rotation, Vector};
 use parry3d::query;
 use parry3d::shape::{Cuboid, Cylinder, Shape as ParryShape};
 
+use crate::support::robot_of;
+
 fn space_of(path: &Path) -> Space {
     let campaign =
         config::load(path, &Overrides::default()).unwrap_or_else(|found| panic!("{found}"));
     let ontology = ontology::load(&campaign.ontology.0, &campaign.ontology.1)
         .unwrap_or_else(|found| panic!("{found}"));
-    Space::new(&campaign, &ontology).unwrap_or_else(|found| panic!("{found}"))
+    Space::new(&campaign, &ontology, &robot_of(&campaign)).unwrap_or_else(|found| panic!("{found}"))
 }
 
 /// The space of a configuration that varies only the objects.

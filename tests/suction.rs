@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use actcheck::base::Files;
 use actcheck::data::{
-    ObjectModel, Part, Pose, RobotProfile, RobotStart, Role, SceneObject, Shape, Suction,
+    Hand, LinkFrame, ObjectModel, Part, Pose, RobotProfile, RobotStart, Role, SceneObject, Shape,
+    Suction,
 };
 use actcheck::world::{Command, GRAVITY, World, build};
 use serde_json::Value;
@@ -30,8 +31,9 @@ const TROLLEY_KG: f64 = 1.0;
 /// The crane, with its cup at `link` and its lift at this height. Unit: metres.
 fn crane(link: &str, lift_m: f64) -> RobotProfile {
     let path = Path::new("tests/models/suction/crane.toml");
-    let profile = actcheck::config::robot::read(&Files::Disk, path).expect("the crane is right");
-    let suction = profile.suction.expect("the crane has a cup");
+    let stated = actcheck::config::robot::read(&Files::Disk, path).expect("the crane is right");
+    let profile = stated.complete().expect("it states all roles");
+    let suction = profile.hand.suction.expect("the crane has a cup");
     assert_eq!(
         suction,
         Suction {
@@ -40,10 +42,12 @@ fn crane(link: &str, lift_m: f64) -> RobotProfile {
             friction: 0.5
         }
     );
-    let finger_links = [link.to_owned(), link.to_owned()];
+    let grasp = LinkFrame {
+        link: link.to_owned(),
+        ..profile.hand.grasp
+    };
     RobotProfile {
-        grasp_link: link.to_owned(),
-        finger_links,
+        hand: Hand::of_cup(grasp, suction),
         home: vec![lift_m, 0.0],
         ..profile
     }
@@ -72,7 +76,7 @@ fn world(profile: RobotProfile, load: SceneObject) -> World {
         0.5,
     );
     let mut scene = scene(vec![platform, load]);
-    let root_height_m = profile.mount_height_m;
+    let root_height_m = profile.core.mount_height_m;
     scene.robot = RobotStart {
         profile: Arc::new(profile),
         base: [0.0; 3],

@@ -9,7 +9,7 @@ use actcheck::ontology;
 use actcheck::scenario::{self, Space};
 
 use crate::support::urdf::{joint, link};
-use crate::support::{actcheck, stderr, stdout};
+use crate::support::{actcheck, robot_of, stderr, stdout};
 
 fn desk_arm() -> String {
     let mut text = "<robot name=\"desk_arm\">\n".to_owned();
@@ -111,7 +111,8 @@ fn scenes(folder: &Path, count: u64) -> Vec<Scene> {
         .unwrap_or_else(|found| panic!("{found}"));
     let ontology = ontology::load(&campaign.ontology.0, &campaign.ontology.1)
         .unwrap_or_else(|found| panic!("{found}"));
-    let space = Space::new(&campaign, &ontology).unwrap_or_else(|found| panic!("{found}"));
+    let space = Space::new(&campaign, &ontology, &robot_of(&campaign))
+        .unwrap_or_else(|found| panic!("{found}"));
     (0..count)
         .filter_map(|index| scenario::draw(&space, 0, &mut Choices::random(3, index)).ok())
         .collect()

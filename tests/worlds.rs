@@ -648,8 +648,8 @@ fn unknown_place_names_are_reported() {
         Ok(campaign) => {
             let ontology =
                 actcheck::ontology::load(&campaign.ontology.0, &campaign.ontology.1).unwrap();
-            actcheck::scenario::Space::new(&campaign, &ontology)
-                .map_or_else(|found| found.to_string(), |_| String::new())
+            actcheck::scenario::Space::check(&campaign, &ontology)
+                .map_or_else(|found| found.to_string(), |()| String::new())
         }
     };
     for (text, expected) in [

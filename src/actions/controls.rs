@@ -69,7 +69,8 @@ impl Operator<'_> {
         self.drives.velocities.extend(&controls.velocities);
         self.command.efforts.extend(&controls.efforts);
         if let Some(opening_m) = controls.opening_m {
-            self.command.gripper_opening_m = opening_m.clamp(0.0, self.profile().max_opening_m);
+            self.command.gripper_opening_m =
+                opening_m.clamp(0.0, self.profile().hand.max_opening_m);
         }
         if let Some(force_n) = controls.force_n {
             self.command.grip_force_n = force_n.max(0.0);

@@ -65,7 +65,7 @@ const N_HEADINGS: u32 = 24;
 /// How wide the hand opens before an object. Unit: metres. A jaw that moves against a fixed one
 /// swings far out, and needs no more than some room; other hands open as wide as they can.
 pub(crate) fn opening_before_m(thing: &Sighting, robot: &Operator<'_>) -> f64 {
-    let most_m = robot.profile().max_opening_m;
+    let most_m = robot.profile().hand.max_opening_m;
     let [width, depth, _] = thing.size_m;
     match robot.layout().gripper.has_fixed_jaw() {
         true => most_m.min(width.max(depth) + JAW_ROOM_M),
@@ -260,7 +260,7 @@ pub(crate) fn is_round(thing: &Sighting) -> bool {
 /// Whether an object that the robot knows as a box has corners that don't fit between the fingers.
 pub(crate) fn is_angular(thing: &Sighting, robot: &Operator<'_>) -> bool {
     let [width, depth, _] = thing.size_m;
-    let fits = width.hypot(depth) + LEAST_ROOM_M <= robot.profile().max_opening_m;
+    let fits = width.hypot(depth) + LEAST_ROOM_M <= robot.profile().hand.max_opening_m;
     !fits && robot.kind_of(&thing.id).is_some_and(|kind| kind.is_box)
 }
 

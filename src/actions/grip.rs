@@ -48,7 +48,7 @@ pub fn close(robot: &mut Operator<'_>) -> Result<bool, Interrupt> {
 
 /// Whether both fingers push with about the commanded force.
 pub fn feels(robot: &Operator<'_>) -> bool {
-    feels_in(&robot.observe(), robot.profile().grip_force_n)
+    feels_in(&robot.observe(), robot.profile().hand.grip_force_n)
 }
 
 /// Whether both observed finger efforts are close to the commanded force.

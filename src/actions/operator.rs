@@ -178,7 +178,7 @@ impl<'a> Operator<'a> {
 
     /// Whether the gripper is a suction cup.
     pub fn has_cup(&self) -> bool {
-        self.profile().suction.is_some()
+        self.profile().hand.suction.is_some()
     }
 
     /// The robot's measurements of itself.
@@ -277,7 +277,7 @@ impl<'a> Operator<'a> {
     /// Starts watching whether the held object stays in the hand; if it is held at a wall, with the
     /// thickness of this.
     pub fn watch_grip(&mut self, wall_m: Option<f64>) {
-        let watch = GripWatch::new(&self.observe(), self.profile().grip_force_n);
+        let watch = GripWatch::new(&self.observe(), self.profile().hand.grip_force_n);
         self.grip = Some(match wall_m {
             Some(wall_m) => watch.of_wall(wall_m),
             None => watch,
@@ -469,7 +469,7 @@ impl<'a> Operator<'a> {
     /// Sets the target gap between the fingers, with the profile's grip force.
     pub fn set_opening(&mut self, opening_m: f64) {
         self.command.gripper_opening_m = opening_m;
-        self.command.grip_force_n = self.profile().grip_force_n;
+        self.command.grip_force_n = self.profile().hand.grip_force_n;
     }
 
     /// Whether the run is cut off now. Ticks check it; a skill that waits or perceives must check

@@ -215,16 +215,19 @@ mod tests {
     fn arm(is_fast: bool) -> (Kinematics, Layout, Vec<f64>) {
         let path = Path::new("models/robots/fixed_arm.toml");
         let mut profile = actcheck_config::robot::read(&Files::Shipped, path)
-            .expect("the shipped robot is valid");
+            .expect("the shipped robot is valid")
+            .complete()
+            .expect("it states all roles");
         if is_fast {
             let fast = ["1.7", "2.2", "2.6"]
                 .iter()
-                .fold(profile.urdf.text.to_string(), |text, speed| {
+                .fold(profile.core.urdf.text.to_string(), |text, speed| {
                     text.replace(&format!("velocity=\"{speed}\""), "velocity=\"25\"")
                 });
             let fast = fast.replacen("effort=\"120\"", "effort=\"10\"", 1);
             let fast = Source::new("fast.urdf", fast);
-            profile = actcheck_config::robot::with_urdf(profile, fast).expect("it is a URDF");
+            profile.core =
+                actcheck_config::robot::with_urdf(profile.core, fast).expect("it is a URDF");
         }
         let start = RobotStart {
             profile: Arc::new(profile),

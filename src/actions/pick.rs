@@ -58,7 +58,7 @@ pub fn pick(call: &ActionCall, robot: &mut Operator<'_>) -> Result<ActionReport,
     robot.begin("approach");
     robot.follow(&way.near, 0.0)?;
     let (way, seen) = put_right(way, seen, robot)?;
-    match robot.profile().suction {
+    match robot.profile().hand.suction {
         Some(suction) => cup::approach(&way.approach, APPROACH_SECS, &suction, robot)?,
         None => robot.follow(&way.approach, APPROACH_SECS)?,
     }
@@ -99,7 +99,7 @@ pub(super) fn planned(
         id: seen.id.clone(),
         why,
     };
-    if let Some(suction) = robot.profile().suction {
+    if let Some(suction) = robot.profile().hand.suction {
         let all = cup::grasps(seen, &suction)?;
         let (tops, sides): (Vec<_>, Vec<_>) = all
             .iter()
@@ -142,7 +142,7 @@ pub(super) fn planned(
 
 /// The rim of an upright vessel that is too wide for the hand, as the robot knows its kind.
 fn rim_of(seen: &Sighting, robot: &Operator<'_>) -> Option<Rim> {
-    let is_too_wide = grasp::is_tight(seen, robot.profile().max_opening_m);
+    let is_too_wide = grasp::is_tight(seen, robot.profile().hand.max_opening_m);
     let name = robot
         .kind_of(&seen.id)
         .filter(|_| is_too_wide && !robot.has_cup())?
@@ -237,7 +237,7 @@ fn remember(robot: &mut Operator<'_>, seen: &Sighting, wall_m: Option<f64>) {
 
 /// Reports success if the fingers hold something that is not thinner than this. Unit: metres.
 fn report(robot: &mut Operator<'_>, target: &str, stalled: bool, thinnest_m: f64) -> ActionReport {
-    if let Some(suction) = robot.profile().suction {
+    if let Some(suction) = robot.profile().hand.suction {
         return cup::report(robot, &suction, target, stalled);
     }
     let gap = robot.feel_opening();

@@ -7,7 +7,7 @@ use crate::whereabouts::{
     before, body, box_distance, farther, holds, is_above, mistaken, others_by_distance, outside,
 };
 use crate::{ActionCall, forced, forced_hand, misperception};
-use actcheck_data::{ActionReport, KnownKind, Perceived, RobotProfile, Snapshot};
+use actcheck_data::{ActionReport, KnownKind, Perceived, RobotCore, Snapshot};
 use actcheck_world::{Command, Observation, Perturbation, Sighting, World};
 
 /// Designators of the object that the action handles and of the surface it is placed on.
@@ -123,7 +123,7 @@ impl Sabotage {
     }
 
     /// Whether it can happen to a robot: one without a base can't be pushed against furniture.
-    pub fn suits(&self, robot: &RobotProfile) -> bool {
+    pub fn suits(&self, robot: &RobotCore) -> bool {
         match self.world {
             Some((_, Accident::PushedIntoFurniture)) => robot.base_joints.is_some(),
             Some((_, Accident::ArmThroughHead)) => !robot.head_joints.is_empty(),
@@ -367,7 +367,7 @@ impl Saboteur {
         let now = world.snapshot();
         let object = self.object.as_deref().unwrap_or_default();
         match accident {
-            Accident::HandOpens => self.opening_m = Some(world.profile().max_opening_m),
+            Accident::HandOpens => self.opening_m = Some(world.profile().hand.max_opening_m),
             Accident::HandJams => self.opening_m = Some(0.0),
             Accident::Slippery => return world.perturb(object, Perturbation::Friction(0.0)),
             Accident::Falls => return world.perturb(object, Perturbation::Fall),

@@ -160,7 +160,7 @@ pub(crate) fn closing_m(robot: &Operator<'_>) -> Vec<f64> {
         .gripper
         .joints()
         .any(|idx| joints[idx].kind == JointKind::Revolute);
-    let widest_m = robot.profile().max_opening_m;
+    let widest_m = robot.profile().hand.max_opening_m;
     CLOSING
         .into_iter()
         .filter(|_| turns)

@@ -253,7 +253,7 @@ impl<'a> Arm<'a> {
         let mut opened = start.clone();
         layout
             .gripper
-            .set(&mut opened, operator.profile().max_opening_m);
+            .set(&mut opened, operator.profile().hand.max_opening_m);
         let mut before = space(std::slice::from_ref(&start));
         if !before.clearance(&opened).1 {
             // Fingers that turn wide open come close to the wrist, wherever the arm is.
@@ -261,7 +261,7 @@ impl<'a> Arm<'a> {
         }
         let meanwhile = before.among(others);
         let span = Span::of(kinematics, &layout.arm, &start);
-        let (lifts_m, approach_m) = match operator.profile().on_surface {
+        let (lifts_m, approach_m) = match operator.profile().core.on_surface {
             true => (SHORT_LIFTS_M.as_slice(), SHORT_APPROACH_M),
             false => (LIFTS_M.as_slice(), APPROACH_M),
         };
@@ -538,7 +538,9 @@ mod tests {
     fn an_arm_retreats_only_as_far_as_the_way_is_free() {
         let path = Path::new("models/robots/fixed_arm.toml");
         let profile = actcheck_config::robot::read(&Files::Shipped, path)
-            .expect("the shipped robot is valid");
+            .expect("the shipped robot is valid")
+            .complete()
+            .expect("it states all roles");
         let start = RobotStart {
             profile: Arc::new(profile),
             base: [0.0; 3],

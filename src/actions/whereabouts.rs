@@ -116,7 +116,7 @@ pub(super) fn others_by_distance<'a>(snapshot: &'a Snapshot, object: &str) -> Ve
 
 /// The nearest other object that fits into the hand.
 pub(super) fn mistaken(start: &Snapshot, object: &str, world: &World) -> Option<String> {
-    let widest = world.profile().max_opening_m - ROOM_M;
+    let widest = world.profile().hand.max_opening_m - ROOM_M;
     let fits = |body: &&&BodyState| {
         let side = |axis: usize| body.aabb_max[axis] - body.aabb_min[axis];
         side(0).min(side(1)) <= widest

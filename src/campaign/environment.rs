@@ -186,7 +186,7 @@ impl Env {
         solids::decompose_meshes(&mut campaign, &mut faults);
         check_search(&campaign, &mut faults);
         check_skills(&campaign, &ontology, &mut faults);
-        let robot = solids::complete_robot(&mut campaign)
+        let robot = solids::complete_robot(&campaign.robot)
             .map_err(|error| faults.push(error.diagnostic()))
             .ok();
         if let Some(Err(error)) = robot.as_ref().map(Robot::check) {
@@ -194,9 +194,11 @@ impl Env {
         }
         let implausible = plausible::implausible(&campaign, robot.as_ref());
         campaign.warnings.extend(implausible.clone());
-        let space = Space::new(&campaign, &ontology)
-            .map_err(|found| faults.extend(found))
-            .ok();
+        let space = match &robot {
+            Some(robot) => Space::new(&campaign, &ontology, &robot.profile).map(Some),
+            None => Space::check(&campaign, &ontology).map(|()| None),
+        };
+        let space = space.map_err(|found| faults.extend(found)).ok().flatten();
         let rules = RuleBook::prepare_within(&ontology, &rule_budget)
             .map_err(|found| faults.extend(found))
             .ok();
@@ -270,8 +272,8 @@ impl Env {
             .map(|model| (model.name.clone(), model.digest.clone()))
             .collect();
         models.push((
-            self.campaign.robot.name.clone(),
-            self.campaign.robot.digest.clone(),
+            self.campaign.robot.core.name.clone(),
+            self.campaign.robot.core.digest.clone(),
         ));
         let worlds = self.campaign.worlds.values();
         models.extend(worlds.map(|world| (format!("world {}", world.name), world.digest.clone())));

@@ -62,7 +62,7 @@ impl Env {
                 continue;
             };
             let key = format!("pickObject.{idx}");
-            let unheld = match self.campaign.robot.suction {
+            let unheld = match self.robot.profile.hand.suction {
                 Some(cup) => self.unsealed(&key, model, &cup),
                 None => {
                     let narrow = self
@@ -134,8 +134,8 @@ impl Env {
 
     /// S076 if a shape is between the fingers.
     fn obstructed(&self) -> Option<Diagnostic> {
-        let robot = &self.campaign.robot;
-        if robot.suction.is_some() {
+        let robot = &self.robot.profile;
+        if robot.hand.suction.is_some() {
             return None;
         }
         let links = self.robot.shapes_between_fingers();
@@ -145,7 +145,7 @@ impl Env {
         let names = links.join("`, `");
         let message = format!(
             "the shape of `{names}` is between the fingers of {}: it keeps every object out of the hand",
-            robot.name,
+            robot.core.name,
         );
         let quoted = links
             .iter()
@@ -164,7 +164,7 @@ impl Env {
 
     /// S075 if joints with a role have no known effort.
     fn unknown_efforts(&self) -> Option<Diagnostic> {
-        let robot = &self.campaign.robot;
+        let robot = &self.robot.profile;
         let (joints, effort) = (self.robot.assumed_efforts(), world::UNKNOWN_EFFORT);
         if joints.is_empty() {
             return None;
@@ -172,7 +172,7 @@ impl Env {
         let message = format!(
             "the `effort` of `{}` of {} is 0 or -1, and so unknown: {effort} N or N·m is used",
             joints.join("`, `"),
-            robot.name,
+            robot.core.name,
         );
         let help = "state the largest force or torque of each joint in the robot's file: in URDF `<limit effort=\"…\">`, in SDF \
              `<effort>`, in MJCF the `forcerange` of its actuator";
@@ -185,7 +185,7 @@ impl Env {
 
     /// S075 if joints with a role have no known speed.
     fn unknown_speeds(&self) -> Option<Diagnostic> {
-        let robot = &self.campaign.robot;
+        let robot = &self.robot.profile;
         let (joints, [turning, sliding]) = (self.robot.assumed_speeds(), world::UNKNOWN_SPEEDS);
         if joints.is_empty() {
             return None;
@@ -193,7 +193,7 @@ impl Env {
         let message = format!(
             "the largest `velocity` of `{}` of {} is 0 or -1, and so unknown: {turning} rad/s or {sliding} m/s is used",
             joints.join("`, `"),
-            robot.name,
+            robot.core.name,
         );
         let help = "state the largest speed of each joint in the robot's file: in URDF `<limit velocity=\"…\">`, in SDF \
              `<velocity>`";
@@ -206,12 +206,12 @@ impl Env {
 
     /// S074 for each joint of the arm that can't hold the arm by its motor alone.
     fn too_weak(&self) -> Vec<Diagnostic> {
-        let robot = &self.campaign.robot;
+        let robot = &self.robot.profile;
         let warning = |joint: &world::BalancedJoint| {
             let message = format!(
                 "the joint `{}` of {} can't hold the arm: its `effort` is {:.1}, and the weight of the links beyond it \
                  needs up to {:.1}; it is simulated as balanced by a spring",
-                joint.name, robot.name, joint.effort, joint.weight,
+                joint.name, robot.core.name, joint.effort, joint.weight,
             );
             let help = "nothing, if the robot has springs or counterweights; otherwise correct the joint's `effort`, or \
                         the masses of the links, in the robot's file";
@@ -224,12 +224,12 @@ impl Env {
 
     /// S070 if the gripper opens too little for the narrower side.
     fn too_wide(&self, key: &str, model: &ObjectModel) -> Option<Diagnostic> {
-        let (robot, [width, depth, _]) = (&self.campaign.robot, model.size_m);
+        let (robot, [width, depth, _]) = (&self.robot.profile, model.size_m);
         let needed_m = actions::needed_opening_m(width.min(depth));
         let at_rim = model
             .rim()
-            .is_some_and(|rim| actions::takes_rim(&rim, robot.max_opening_m));
-        if needed_m <= robot.max_opening_m || at_rim || self.campaign.lying.0 > 0.0 {
+            .is_some_and(|rim| actions::takes_rim(&rim, robot.hand.max_opening_m));
+        if needed_m <= robot.hand.max_opening_m || at_rim || self.campaign.lying.0 > 0.0 {
             return None;
         }
         let message = format!(
@@ -239,8 +239,8 @@ impl Env {
             centimetres(width),
             centimetres(depth),
             centimetres(needed_m),
-            robot.name,
-            centimetres(robot.max_opening_m),
+            robot.core.name,
+            centimetres(robot.hand.max_opening_m),
         );
         let help = "every pick of it will fail: name a narrower object, or a robot whose gripper opens wider";
         Some(self.campaign.warning("S070", key, message).help(help))
@@ -248,9 +248,10 @@ impl Env {
 
     /// S072 if friction between the fingers can't carry the heaviest variant of the object.
     fn too_slippery(&self, key: &str, model: &ObjectModel) -> Option<Diagnostic> {
-        let (robot, physics) = (&self.campaign.robot, &self.campaign.physics);
-        let friction = (robot.finger_friction * model.friction * physics.friction_scale.1).sqrt();
-        let carried_kg = 2.0 * friction * robot.grip_force_n / GRAVITY;
+        let (robot, physics) = (&self.robot.profile, &self.campaign.physics);
+        let friction =
+            (robot.hand.finger_friction * model.friction * physics.friction_scale.1).sqrt();
+        let carried_kg = 2.0 * friction * robot.hand.grip_force_n / GRAVITY;
         let lightest_kg = model.mass_kg * physics.mass_scale.0;
         if lightest_kg <= carried_kg {
             return None;
@@ -258,7 +259,7 @@ impl Env {
         let message = format!(
             "`{}` slips out of the gripper: it has at least {lightest_kg:.2} kg, and two fingers that press with {:.1} N carry \
              {carried_kg:.2} kg at a friction coefficient of {friction:.2}",
-            model.name, robot.grip_force_n,
+            model.name, robot.hand.grip_force_n,
         );
         let help = "every pick of it will fail: reduce the object's mass, or raise `grip_force_n` in the robot's profile, or \
              the `effort` of the finger joints in its file if that limits it";
@@ -268,10 +269,10 @@ impl Env {
     /// S072 if the fingers are so steep a wedge around the object that friction does not hold it:
     /// half of the angle between them is above the friction angle.
     fn squeezed_out(&self, key: &str, model: &ObjectModel) -> Option<Diagnostic> {
-        let (robot, [width, depth, _]) = (&self.campaign.robot, model.size_m);
+        let (robot, [width, depth, _]) = (&self.robot.profile, model.size_m);
         let width_m = width.min(depth);
         let steepness = self.robot.outward_push(width_m)?;
-        let friction = (robot.finger_friction * model.friction).sqrt();
+        let friction = (robot.hand.finger_friction * model.friction).sqrt();
         if steepness < friction {
             return None;
         }
@@ -280,7 +281,7 @@ impl Env {
             "`{}` is squeezed out of the gripper: where the fingers of {} hold its width of {}, they are at {:.0}° to each \
              other, and friction with a coefficient of {friction:.2} holds up to {:.0}°",
             model.name,
-            robot.name,
+            robot.core.name,
             centimetres(width_m),
             2.0 * degrees(steepness),
             2.0 * degrees(friction),
@@ -393,7 +394,7 @@ impl Env {
             );
             let message = format!(
                 "the camera of {} does not see the top of `{surface}`: {why}",
-                self.campaign.robot.name
+                self.robot.profile.core.name
             );
             let help =
                 "change `camera_link` or `home` in the robot's profile, `[camera]`, or the surface";

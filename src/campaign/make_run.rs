@@ -153,7 +153,7 @@ fn entry(env: &Env, record: &RunRecord) -> Result<Entry, Diagnostics> {
 
 fn no_scene(env: &Env, planned: &Planned, last: &str) -> Diagnostic {
     let room = "put fewer objects on the surface (`[surfaceObjects] count`), smaller ones, or a larger surface";
-    let help = match env.campaign.robot.reach_m {
+    let help = match env.robot.profile.core.reach_m {
         Some([nearest, farthest]) => format!(
             "{room}; objects to pick must be {nearest} to {farthest} m from the robot's root, by `reach_m` in its profile"
         ),

@@ -34,7 +34,7 @@ const MOST_LIFTED: f64 = 1.5;
 impl Env {
     /// Mass and size of the robot and of each model that the configuration names, one line each.
     pub fn masses_and_sizes(&self) -> String {
-        let robot = &self.campaign.robot;
+        let robot = &self.robot.profile.core;
         let RobotMeasures {
             mass_kg, size_m, ..
         } = self.robot.measures();
@@ -161,7 +161,7 @@ fn implausible_size(model: &ObjectModel) -> Option<(String, &'static str)> {
 
 /// Warnings about the robot's size, and about its mass for the load that it lifts.
 fn implausible_robot(campaign: &Campaign, measured: RobotMeasures) -> Vec<Diagnostic> {
-    let robot = &campaign.robot;
+    let robot = &campaign.robot.core;
     let RobotMeasures {
         mass_kg,
         size_m,

@@ -61,7 +61,7 @@ pub fn playable(
     detail: &RunDetail,
     context: &RunContext,
 ) -> Result<PlayableRun, Diagnostics> {
-    if env.campaign.robot.suction.is_some() {
+    if env.robot.profile.hand.suction.is_some() {
         let message = format!(
             "run {} can't be written as MJCF: its robot holds things by a suction cup, whose seal MuJoCo does not have",
             detail.row.run

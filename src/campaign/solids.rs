@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use actcheck_base::{Below, Diagnostic, Diagnostics, Digest};
 use actcheck_config::Campaign;
-use actcheck_data::{Mesh, ObjectModel, Part, RobotProfile, Shape};
+use actcheck_data::{Mesh, ObjectModel, Part, RobotCore, Shape, StatedRobot};
 use actcheck_world::{self as world, DecompositionFault, Robot};
 
 /// Cache folder in the history's folder.
@@ -42,7 +42,7 @@ pub(super) fn decompose_meshes(campaign: &mut Campaign, faults: &mut Diagnostics
     cache.fill(
         models
             .flat_map(shapes_of)
-            .chain(campaign.robot.meshes.values().flatten()),
+            .chain(campaign.robot.core.meshes.values().flatten()),
     );
     for (name, model) in campaign
         .models
@@ -63,7 +63,8 @@ pub(super) fn decompose_meshes(campaign: &mut Campaign, faults: &mut Diagnostics
             );
         }
     }
-    decompose_with(&mut cache, Arc::make_mut(&mut campaign.robot), faults);
+    let robot = Arc::make_mut(&mut campaign.robot);
+    decompose_with(&mut cache, &mut robot.core, faults);
 }
 
 /// The shapes of a model and of its moving parts.
@@ -100,7 +101,7 @@ fn decompose_model(
 /// # Errors
 /// W037 for each mesh without a convex decomposition; W020 to W024 if no profile can be proposed.
 pub fn proposed_robot(
-    mut robot: RobotProfile,
+    mut robot: RobotCore,
     history: &Path,
     hand: Option<&str>,
 ) -> Result<world::Proposal, Diagnostics> {
@@ -112,29 +113,25 @@ pub fn proposed_robot(
     cache.fill(robot.meshes.values().flatten());
     decompose_with(&mut cache, &mut robot, &mut faults);
     faults.or(())?;
-    Ok(world::propose(&robot, hand).map_err(|error| error.diagnostic())?)
+    Ok(world::propose(robot, hand).map_err(|error| error.diagnostic())?)
 }
 
 /// Finds the roles that the robot's profile leaves out, limits the force of its grip to that of its
-/// motors, and returns the compiled robot.
+/// motors, and returns the compiled robot: once for all runs of a campaign.
 ///
 /// # Errors
 /// [`world::RobotError`] if they can't be found.
-pub(super) fn complete_robot(campaign: &mut Campaign) -> Result<Robot, world::RobotError> {
-    if world::is_incomplete(&campaign.robot) {
-        campaign.robot = Arc::new(world::complete(&campaign.robot)?.profile);
-    }
-    let mut robot = Robot::compile(&campaign.robot)?;
+pub(super) fn complete_robot(stated: &StatedRobot) -> Result<Robot, world::RobotError> {
+    let mut robot = Robot::compile(&Arc::new(world::complete(stated)?.profile))?;
     let limit_n = robot.grip_limit_n();
-    if limit_n < campaign.robot.grip_force_n {
-        Arc::make_mut(&mut campaign.robot).grip_force_n = limit_n;
+    if limit_n < robot.profile.hand.grip_force_n {
         // The links and joints don't depend on the force.
-        robot.profile = Arc::clone(&campaign.robot);
+        Arc::make_mut(&mut robot.profile).hand.grip_force_n = limit_n;
     }
     Ok(robot)
 }
 
-fn decompose_with(cache: &mut HullCache, robot: &mut RobotProfile, faults: &mut Diagnostics) {
+fn decompose_with(cache: &mut HullCache, robot: &mut RobotCore, faults: &mut Diagnostics) {
     for (file, shapes) in &mut robot.meshes {
         let apart: Result<Vec<Vec<Shape>>, DecompositionFault> = shapes
             .iter()

@@ -83,7 +83,7 @@ pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics
             .first()
             .map_or("", |source| &source.name),
         counted(env.campaign.models.len() as u64, "model"),
-        env.campaign.robot.name,
+        env.campaign.robot.core.name,
     ));
     output::print(&env.masses_and_sizes());
     if args.mend {
@@ -93,7 +93,7 @@ pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics
     }
     if let (Some(picture), Some(drawing)) = (
         picture,
-        robot_picture(&env.campaign.robot.name, &env.robot_views()),
+        robot_picture(&env.campaign.robot.core.name, &env.robot_views()),
     ) {
         picture.write(&drawing)?;
     }

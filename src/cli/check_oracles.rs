@@ -83,7 +83,7 @@ pub fn check_oracles(args: &CheckOraclesArgs) -> Result<u8, Diagnostics> {
         env.campaign
             .tests
             .iter()
-            .any(|test| fault.concerns(test, &env.campaign.robot))
+            .any(|test| fault.concerns(test, &env.campaign.robot.core))
     };
     let faults: Vec<Fault> = FAULTS.into_iter().filter(concerns).collect();
     let steps = env.planned_runs() * (faults.len() as u64 + 1);

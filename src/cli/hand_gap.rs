@@ -16,7 +16,7 @@ const LINKS: &str = "finger_links = []";
 
 /// The part of the profile: each line to fill in after a comment about its meaning.
 pub(super) fn text(hand: &UnknownHand) -> String {
-    let palm = one_line(&hand.palm);
+    let palm = one_line(&hand.grasp.link);
     let mut text = format!(
         "\n# GAP: {}.\n# Fill in the two empty lists. For a suction cup, replace them by `suction_force_n`, `suction_radius_m` and \
          `grasp_link`.\n",
@@ -55,8 +55,8 @@ pub(super) fn text(hand: &UnknownHand) -> String {
          # max_opening_m: the widest gap between the fingertips, in metres. Without this line, it is measured.\n\
          # max_opening_m = 0.08\n",
         quoted(&palm),
-        numbers(&hand.offset_m),
-        numbers(&hand.turned_rad),
+        numbers(&hand.grasp.offset_m),
+        numbers(&hand.grasp.turned_rad),
     );
     text
 }

@@ -8,10 +8,10 @@ use clap::Args;
 use crate::new_files::NewFiles;
 use crate::{hand_gap, output};
 use actcheck_base::{Diagnostics, Files, ShellLine, Source};
-use actcheck_campaign::{Proposal, UnknownHand, proposed_robot};
+use actcheck_campaign::{Proposal, proposed_robot};
 use actcheck_config::quoted;
 use actcheck_config::robot;
-use actcheck_data::RobotProfile;
+use actcheck_data::{Hand, LinkFrame};
 
 /// Folder of the cache of convex meshes: the usual history beside a configuration.
 const HISTORY: &str = ".actcheck";
@@ -62,47 +62,48 @@ pub fn robot(args: &NewRobotArgs) -> Result<(), Diagnostics> {
     files.add(&out, text.as_bytes());
     files.write("name another file with `--out PROFILE`, or delete it")?;
     output::print_prose(&written(&proposal, &out));
-    match &proposal.unknown_hand {
-        Some(hand) => {
-            Err(hand_gap::fault(hand, &Source::new(out.display().to_string(), text)).into())
-        }
-        None => Ok(()),
+    match &proposal.hand {
+        Ok(_) => Ok(()),
+        Err(gap) => Err(hand_gap::fault(gap, &Source::new(out.display().to_string(), text)).into()),
     }
 }
 
 /// The message about a written profile.
 fn written(proposal: &Proposal, out: &Path) -> String {
-    let profile = &proposal.profile;
-    let gripper = match &profile.suction {
-        _ if proposal.unknown_hand.is_some() => "no gripper yet".to_owned(),
-        Some(cup) => format!(
+    let gripper = match &proposal.hand {
+        Ok(Hand {
+            suction: Some(cup),
+            grasp,
+            ..
+        }) => format!(
             "a suction cup of {:.0} mm at {}",
             cup.radius_m * 2e3,
-            profile.grasp_link
+            grasp.link
         ),
-        None => {
-            let [left, right] = &profile.finger_links;
+        Ok(hand) => {
+            let [left, right] = &hand.finger_links;
             format!(
                 "fingers {left} and {right} that open {:.0} mm",
-                profile.max_opening_m * 1e3
+                hand.max_opening_m * 1e3
             )
         }
+        Err(_) => "no gripper yet".to_owned(),
     };
-    let next = match proposal.unknown_hand {
-        Some(_) => "fill in the gap in this file, then ",
-        None => "",
+    let next = match proposal.hand {
+        Ok(_) => "",
+        Err(_) => "fill in the gap in this file, then ",
     };
     let mut message = format!(
         "wrote {}: {} with an arm of {} joints, {gripper}, camera {}\n\
          next: {next}name it as `profile` in `[robot]` of a configuration, then `actcheck check CONFIG`\n",
         out.display(),
-        if profile.base_joints.is_some() {
+        if proposal.core.base_joints.is_some() {
             "a mobile robot"
         } else {
             "a fixed robot"
         },
-        profile.arm_joints.len(),
-        profile.camera_link,
+        proposal.arm_joints.len(),
+        proposal.camera.link,
     );
     if !proposal.other_hands.is_empty() {
         let others = proposal.other_hands.join("`, `");
@@ -116,22 +117,14 @@ fn written(proposal: &Proposal, out: &Path) -> String {
 /// The profile as TOML, with a comment for each guess. The keys that the program finds on the model
 /// whenever it reads the profile are comments too.
 fn text(proposal: &Proposal, args: &NewRobotArgs, folder: &Path) -> String {
-    let Proposal {
-        profile,
-        notes,
-        unknown_hand,
-        ..
-    } = proposal;
     let command = ShellLine::default()
         .fixed("actcheck new robot")
         .file(&args.model);
     let title = format!("# Proposed by `{command}`: check each guess.\n");
-    let stated = lines(&stated(proposal, args, folder), notes);
-    let gap = unknown_hand
-        .as_ref()
-        .map(hand_gap::text)
-        .unwrap_or_default();
-    let found = lines(&found(profile, unknown_hand.as_ref()), notes)
+    let stated = lines(&stated(proposal, args, folder), &proposal.notes);
+    let gap = proposal.hand.as_ref().err();
+    let gap = gap.map(hand_gap::text).unwrap_or_default();
+    let found = lines(&found(proposal), &proposal.notes)
         .lines()
         .map(commented)
         .collect::<String>();
@@ -162,7 +155,7 @@ fn lines(keys: &[(&'static str, String)], notes: &BTreeMap<&'static str, String>
 
 /// The keys that a profile needs, or that decide about the others.
 fn stated(proposal: &Proposal, args: &NewRobotArgs, folder: &Path) -> Vec<(&'static str, String)> {
-    let profile = &proposal.profile;
+    let core = &proposal.core;
     let mut keys = vec![("urdf", quoted(&seen_from(folder, &args.model)))];
     if !args.package_dirs.is_empty() {
         let folders: Vec<String> = args
@@ -175,78 +168,85 @@ fn stated(proposal: &Proposal, args: &NewRobotArgs, folder: &Path) -> Vec<(&'sta
     if !args.xacro_args.is_empty() {
         keys.push(("xacro_args", list(&args.xacro_args)));
     }
-    match &profile.base_joints {
-        Some(_) if profile.planar_base => keys.push(("base", quoted("planar"))),
+    match &core.base_joints {
+        Some(_) if core.planar_base => keys.push(("base", quoted("planar"))),
         Some(joints) => keys.push(("base_joints", list(joints))),
         None => {}
     }
-    if profile.on_surface {
+    if core.on_surface {
         keys.push(("mount", quoted("surface")));
     }
-    if profile.mount_turned_rad != 0.0 {
-        keys.push(("mount_turned_rad", profile.mount_turned_rad.to_string()));
+    if core.mount_turned_rad != 0.0 {
+        keys.push(("mount_turned_rad", core.mount_turned_rad.to_string()));
     }
-    if let Some(reach_m) = &profile.reach_m {
+    if let Some(reach_m) = &core.reach_m {
         keys.push(("reach_m", numbers(reach_m)));
     }
-    if profile.mount_height_m != 0.0 {
-        keys.push(("mount_height_m", profile.mount_height_m.to_string()));
+    if core.mount_height_m != 0.0 {
+        keys.push(("mount_height_m", core.mount_height_m.to_string()));
     }
-    keys.push(("arm_joints", list(&profile.arm_joints)));
-    if let Some(cup) = &profile.suction {
-        keys.extend(grasp_frame(profile));
-        keys.push(("suction_force_n", cup.force_n.to_string()));
-        keys.push(("suction_radius_m", cup.radius_m.to_string()));
-    } else if proposal.unknown_hand.is_none() {
-        keys.push(("finger_joints", list(&profile.finger_joints)));
-        keys.push(("finger_links", list(&profile.finger_links)));
+    keys.push(("arm_joints", list(&proposal.arm_joints)));
+    if let Ok(hand) = &proposal.hand {
+        match &hand.suction {
+            Some(cup) => {
+                keys.extend(grasp_frame(&hand.grasp));
+                keys.push(("suction_force_n", cup.force_n.to_string()));
+                keys.push(("suction_radius_m", cup.radius_m.to_string()));
+            }
+            None => {
+                keys.push(("finger_joints", list(&hand.finger_joints)));
+                keys.push(("finger_links", list(&hand.finger_links)));
+            }
+        }
     }
-    if !profile.head_joints.is_empty() {
-        keys.push(("head_joints", list(&profile.head_joints)));
+    if !core.head_joints.is_empty() {
+        keys.push(("head_joints", list(&core.head_joints)));
     }
-    if !profile.parked.is_empty() {
-        let (joints, positions): (Vec<String>, Vec<f64>) = profile.parked.iter().cloned().unzip();
+    if !core.parked.is_empty() {
+        let (joints, positions): (Vec<String>, Vec<f64>) = core.parked.iter().cloned().unzip();
         keys.push(("parked_joints", list(&joints)));
         keys.push(("parked", numbers(&positions)));
     }
-    if !profile.no_collision_links.is_empty() {
-        keys.push(("no_collision_links", list(&profile.no_collision_links)));
+    if !core.no_collision_links.is_empty() {
+        keys.push(("no_collision_links", list(&core.no_collision_links)));
     }
     keys
 }
 
 /// The keys that a profile may leave out.
-fn found(profile: &RobotProfile, gap: Option<&UnknownHand>) -> Vec<(&'static str, String)> {
+fn found(proposal: &Proposal) -> Vec<(&'static str, String)> {
     let mut keys = Vec::new();
-    if profile.suction.is_none() && gap.is_none() {
-        keys.extend(grasp_frame(profile));
-        keys.push(("max_opening_m", profile.max_opening_m.to_string()));
+    if let Ok(hand) = &proposal.hand
+        && hand.suction.is_none()
+    {
+        keys.extend(grasp_frame(&hand.grasp));
+        keys.push(("max_opening_m", hand.max_opening_m.to_string()));
     }
-    keys.push(("camera_link", quoted(&profile.camera_link)));
-    let usual = if profile.camera_link.contains("optical") {
+    let camera = &proposal.camera;
+    keys.push(("camera_link", quoted(&camera.link)));
+    let usual = if camera.link.contains("optical") {
         robot::OPTICAL_TURNED_RAD
     } else {
         [0.0; 3]
     };
-    if profile.camera_turned_rad != usual {
-        keys.push(("camera_turned_rad", numbers(&profile.camera_turned_rad)));
+    if camera.turned_rad != usual {
+        keys.push(("camera_turned_rad", numbers(&camera.turned_rad)));
     }
-    keys.push(("home", numbers(&profile.home)));
-    keys.push(("postures", postures(profile)));
+    keys.push(("home", numbers(&proposal.home)));
+    keys.push(("postures", postures(&proposal.postures)));
     keys
 }
 
-fn grasp_frame(profile: &RobotProfile) -> [(&'static str, String); 3] {
+fn grasp_frame(grasp: &LinkFrame) -> [(&'static str, String); 3] {
     [
-        ("grasp_link", quoted(&profile.grasp_link)),
-        ("grasp_offset_m", numbers(&profile.grasp_offset_m)),
-        ("grasp_turned_rad", numbers(&profile.grasp_turned_rad)),
+        ("grasp_link", quoted(&grasp.link)),
+        ("grasp_offset_m", numbers(&grasp.offset_m)),
+        ("grasp_turned_rad", numbers(&grasp.turned_rad)),
     ]
 }
 
-fn postures(profile: &RobotProfile) -> String {
-    let each = profile
-        .postures
+fn postures(postures: &[Vec<f64>]) -> String {
+    let each = postures
         .iter()
         .map(|arm| format!("    {{ arm = {} }},\n", numbers(arm)));
     format!("[\n{}]", each.collect::<String>())

@@ -1,7 +1,7 @@
 //! A validated campaign configuration.
 
 use actcheck_base::{Diagnostic, Diagnostics, Files, Keeping, Shard, Source, Span};
-use actcheck_data::{Budget, ObjectModel, Physics, Range, RobotProfile, Sensing};
+use actcheck_data::{Budget, ObjectModel, Physics, Range, Sensing, StatedRobot};
 use actcheck_search::Strategy;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
@@ -35,8 +35,8 @@ pub struct Campaign {
     /// The worlds that contain the scenes (`[world] worlds`), by name; if empty, scenes have only a
     /// floor.
     pub worlds: BTreeMap<String, Arc<WorldMap>>,
-    /// The robot (`[robot]`).
-    pub robot: Arc<RobotProfile>,
+    /// The robot as its profile states it (`[robot]`).
+    pub robot: Arc<StatedRobot>,
     /// Names of the obstacle models (`nav_obstacle_list`).
     pub nav_obstacles: Vec<String>,
     /// Number of obstacles on the floor (`nav_obstacle_count`).

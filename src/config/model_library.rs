@@ -9,7 +9,7 @@ use crate::foreign::{self, Lookup};
 use crate::paths::resolve_path;
 use crate::{Furniture, Located, Table, WorldMap, model, robot, world_map};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Severity, Span, did_you_mean};
-use actcheck_data::{ObjectModel, Range, RobotProfile};
+use actcheck_data::{ObjectModel, Range, StatedRobot};
 
 /// Folder of the models embedded in the program.
 const SHIPPED_MODELS: &str = "models";
@@ -563,7 +563,7 @@ impl ModelLibrary {
         root: &mut Table,
         folder: &Path,
         found: &mut Diagnostics,
-    ) -> Option<Arc<RobotProfile>> {
+    ) -> Option<Arc<StatedRobot>> {
         let (files, path, packages) = self.locate_robot(root, folder, found)?;
         match robot::read_telling(&files, &path, &packages) {
             Ok((profile, warnings)) => {

@@ -1,7 +1,7 @@
 //! Robot profiles: the roles of a URDF's joints and links.
 
 use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, Source, digest_of};
-use actcheck_data::RobotProfile;
+use actcheck_data::{LinkFrame, RobotCore, RobotProfile, StatedFingers, StatedHand, StatedRobot};
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -51,9 +51,6 @@ const DEPENDENT: [(&str, &str); 10] = [
     ("postures", "arm_joints"),
 ];
 
-/// Friction of the fingertips if the profile has none: that of rubber pads.
-const FINGER_FRICTION: f64 = 0.8;
-
 /// Rotation of the camera's frame relative to a link whose name contains `optical`, if the profile
 /// has none: by ROS's convention, z points forwards and y down in the frame of such a link. Unit:
 /// radians.
@@ -63,16 +60,11 @@ pub const OPTICAL_TURNED_RAD: [f64; 3] = [
     0.0,
 ];
 
-/// Force of a finger if the profile has none and its motors can give it: a usual setting of
-/// grippers that can give 40 N (HSR) to 235 N (Robotiq 2F-85). It holds a can while the arm stops
-/// from its full speed. Unit: newtons.
-const GRIP_FORCE_N: f64 = 30.0;
-
 /// Reads a profile with the meshes around its URDF: [`read_with`] without further folders.
 ///
 /// # Errors
 /// As [`read_with`].
-pub fn read(files: &Files, path: &Path) -> Result<RobotProfile, Diagnostics> {
+pub fn read(files: &Files, path: &Path) -> Result<StatedRobot, Diagnostics> {
     read_with(files, path, &[])
 }
 
@@ -89,7 +81,7 @@ pub fn read_with(
     files: &Files,
     path: &Path,
     packages: &[PathBuf],
-) -> Result<RobotProfile, Diagnostics> {
+) -> Result<StatedRobot, Diagnostics> {
     read_telling(files, path, packages).map(|(profile, _)| profile)
 }
 
@@ -101,7 +93,7 @@ pub(crate) fn read_telling(
     files: &Files,
     path: &Path,
     packages: &[PathBuf],
-) -> Result<(RobotProfile, Diagnostics), Diagnostics> {
+) -> Result<(StatedRobot, Diagnostics), Diagnostics> {
     let source = files.read(path).map_err(|reason| {
         Diagnostic::error(
             "W010",
@@ -160,17 +152,17 @@ pub(crate) fn read_telling(
         .ok_or_else(incomplete)
 }
 
-/// Returns a profile with the links and joints of another URDF instead of its own; its meshes stay.
-/// Shapes, masses and roles are not checked.
+/// Returns a robot with the links and joints of another URDF instead of its own; its meshes stay.
+/// Shapes and masses are not checked.
 ///
 /// # Errors
 /// Faults of the text: W031 to W036, W051, W055.
-pub fn with_urdf(profile: RobotProfile, urdf: Source) -> Result<RobotProfile, Diagnostics> {
+pub fn with_urdf(core: RobotCore, urdf: Source) -> Result<RobotCore, Diagnostics> {
     let tree = foreign::robot::tree_of_urdf(&urdf)?;
-    Ok(RobotProfile {
+    Ok(RobotCore {
         urdf,
         tree: Arc::new(tree),
-        ..profile
+        ..core
     })
 }
 
@@ -289,7 +281,7 @@ pub fn bare(
     path: &Path,
     packages: &[PathBuf],
     arguments: &[String],
-) -> Result<RobotProfile, Diagnostics> {
+) -> Result<RobotCore, Diagnostics> {
     let folders = around(path, packages);
     if let Some(refused) = arguments
         .iter()
@@ -316,8 +308,7 @@ pub fn bare(
     let incomplete = || Diagnostic::error("W010", "the robot has no links").in_source(&urdf);
     let read = read.ok_or_else(incomplete)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let none = String::new;
-    let profile = RobotProfile {
+    Ok(RobotCore {
         name: name.split('.').next().unwrap_or_default().to_owned(),
         digest: read.digest_with(digest_of(&read.text.text)),
         urdf: read.urdf,
@@ -328,29 +319,13 @@ pub fn bare(
         mount_turned_rad: 0.0,
         on_surface: false,
         reach_m: None,
-        arm_joints: Vec::new(),
-        finger_joints: Vec::new(),
         head_joints: Vec::new(),
         other_joints: Vec::new(),
         parked: Vec::new(),
         no_collision_links: Vec::new(),
-        grasp_link: none(),
-        grasp_turned_rad: [0.0; 3],
-        grasp_offset_m: [0.0; 3],
-        finger_links: [none(), none()],
-        camera_link: none(),
-        camera_turned_rad: [0.0; 3],
-        camera_offset_m: [0.0; 3],
-        max_opening_m: 0.0,
-        home: Vec::new(),
-        postures: Vec::new(),
-        finger_friction: FINGER_FRICTION,
-        grip_force_n: GRIP_FORCE_N,
-        suction: None,
         meshes: read.meshes,
         surfaces: BTreeMap::new(),
-    };
-    Ok(profile)
+    })
 }
 
 /// Why a robot's file can't be read.
@@ -393,7 +368,7 @@ fn read_table(
     read: Option<&RobotFile>,
     roles: &mut Roles,
     found: &mut Diagnostics,
-) -> Option<RobotProfile> {
+) -> Option<StatedRobot> {
     let file_stem = Path::new(&*table.source().name)
         .file_stem()
         .map(|stem| stem.to_string_lossy().into_owned());
@@ -475,12 +450,8 @@ fn read_table(
     let opening_span = table.key_span("max_opening_m");
     let max_opening_m = table.number("max_opening_m", 0.001..=1.0);
     roles.opening = opening_span.zip(max_opening_m);
-    let finger_friction = table
-        .number("finger_friction", 0.0..=2.0)
-        .unwrap_or(FINGER_FRICTION);
-    let grip_force_n = table
-        .number("grip_force_n", 0.1..=1000.0)
-        .unwrap_or(GRIP_FORCE_N);
+    let finger_friction = table.number("finger_friction", 0.0..=2.0);
+    let grip_force_n = table.number("grip_force_n", 0.1..=1000.0);
     let suction = read_suction(table);
     let n_arm_joints = arm_joints.as_ref().map_or(0, Vec::len);
     let home = posture(table, "home", ("arm_joints", n_arm_joints), roles);
@@ -504,7 +475,7 @@ fn read_table(
     digest.update(table.source().text.as_bytes());
     digest.update(read.text.text.as_bytes());
     let digest = read.digest_with(digest.finish());
-    let profile = RobotProfile {
+    let core = RobotCore {
         name,
         urdf: read.urdf.clone(),
         tree: Arc::new(read.tree.clone()),
@@ -514,32 +485,42 @@ fn read_table(
         mount_turned_rad,
         on_surface,
         reach_m,
-        arm_joints: values(arm_joints.unwrap_or_default()),
-        finger_joints: finger_joints.unwrap_or_default(),
         head_joints: values(head_joints),
         other_joints: values(other_joints),
         parked: values(parked_joints).into_iter().zip(parked).collect(),
         no_collision_links: values(no_collision_links),
-        grasp_link: grasp_link.map(|link| link.value).unwrap_or_default(),
-        grasp_turned_rad,
-        grasp_offset_m,
-        finger_links: finger_links.unwrap_or_default(),
-        camera_link: camera_link.map(|link| link.value).unwrap_or_default(),
-        camera_turned_rad,
-        camera_offset_m,
-        max_opening_m: max_opening_m.unwrap_or_default(),
-        home: home.unwrap_or_default(),
-        postures,
-        finger_friction,
-        grip_force_n,
-        suction: None,
         meshes: read.meshes.clone(),
         surfaces: BTreeMap::new(),
         digest,
     };
-    Some(match suction {
-        Some(cup) => profile.with_cup(cup),
-        None => profile,
+    let grasp = grasp_link.map(|link| LinkFrame {
+        link: link.value,
+        offset_m: grasp_offset_m,
+        turned_rad: grasp_turned_rad,
+    });
+    let camera = camera_link.map(|link| LinkFrame {
+        link: link.value,
+        offset_m: camera_offset_m,
+        turned_rad: camera_turned_rad,
+    });
+    let hand = match suction {
+        Some(cup) => StatedHand::Cup { grasp: grasp?, cup },
+        None => StatedHand::Fingers(StatedFingers {
+            grasp,
+            finger_joints,
+            finger_links,
+            max_opening_m,
+            finger_friction,
+            grip_force_n,
+        }),
+    };
+    Some(StatedRobot {
+        core,
+        arm_joints: arm_joints.map(values),
+        hand,
+        camera,
+        home,
+        postures,
     })
 }
 

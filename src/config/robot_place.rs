@@ -4,7 +4,7 @@ use crate::Table;
 use crate::robot::names;
 use crate::robot_roles::Roles;
 use actcheck_base::did_you_mean;
-use actcheck_data::RobotProfile;
+use actcheck_data::RobotCore;
 
 /// Reads the base: joints of the URDF, joints added below its root (`true`), or none.
 pub(super) fn read_base(
@@ -21,7 +21,7 @@ pub(super) fn read_base(
         return Some((joints, false));
     };
     match (kind.value.as_str(), joints) {
-        ("planar", None) => Some((Some(RobotProfile::PLANAR_JOINTS.map(str::to_owned)), true)),
+        ("planar", None) => Some((Some(RobotCore::PLANAR_JOINTS.map(str::to_owned)), true)),
         ("fixed", None) => Some((None, false)),
         ("planar" | "fixed", Some(_)) => {
             let message = format!(

@@ -23,6 +23,7 @@ mod scene_map;
 mod settings;
 mod shape;
 mod snapshot;
+mod stated_robot;
 mod stream;
 mod trace;
 mod tree;
@@ -40,7 +41,9 @@ pub use part_joint::PartJoint;
 pub use places::{FLOOR_M, Location, OVERHEAD_M, Room};
 pub use pose::Pose;
 pub use quality::Quality;
-pub use robot::{LEAST_LINK_KG, RobotProfile, RobotView, Suction};
+pub use robot::{
+    Hand, LEAST_LINK_KG, LinkFrame, RobotCore, RobotProfile, RobotRoles, RobotView, Suction,
+};
 pub use robot_course::{Clearance, HeldCourse, JointCourse, RobotCourse, SelfCollision, SelfPress};
 pub use samples::{Samples, Series};
 pub use scene::{Attached, KnownKind, RobotStart, Role, Scene, SceneObject};
@@ -48,6 +51,7 @@ pub use scene_map::{NamedSurface, SceneMap};
 pub use settings::{Budget, CONTROL_HZ, Camera, Odometry, Physics, Range, Sensing};
 pub use shape::{Part, Shape, bounds};
 pub use snapshot::{BodyState, CupState, JointState, LinkState, RobotState, Snapshot};
+pub use stated_robot::{FINGER_FRICTION, GRIP_FORCE_N, StatedFingers, StatedHand, StatedRobot};
 pub use stream::Stream;
 pub use trace::{
     ActionEnd, ActionReport, ActionTrace, ContactEpisode, Extremes, Form, Frames, Look, Perceived,

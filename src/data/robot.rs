@@ -10,9 +10,9 @@ use actcheck_base::Source;
 /// Unit: kilograms. Small compared to any real link, large enough for 32-bit arithmetic.
 pub const LEAST_LINK_KG: f64 = 0.01;
 
-/// A robot: its URDF and the roles of its joints and links. Read from a profile next to the URDF.
+/// A robot without the roles of its arm, hand and camera: its links and joints, and its place.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RobotProfile {
+pub struct RobotCore {
     /// Display name.
     pub name: String,
     /// The robot in URDF, as skills receive it: the text of its file, or its tree in this form.
@@ -37,12 +37,6 @@ pub struct RobotProfile {
     /// are placed between them. `None`: anywhere on the half of the surface towards the robot.
     /// Unit: metres.
     pub reach_m: Option<[f64; 2]>,
-    /// Joints that position the hand (lift and arm), from the base outwards.
-    pub arm_joints: Vec<String>,
-    /// Joints with motors that move the fingers: left then right, or one for both or for the only
-    /// finger that moves. Further ones close further fingers with these. Joints that mimic them
-    /// follow.
-    pub finger_joints: Vec<String>,
     /// Head joints, pan then tilt; empty if the head does not move.
     pub head_joints: Vec<String>,
     /// Joints without another role that programs may move. All joints without a role are rigid.
@@ -52,38 +46,6 @@ pub struct RobotProfile {
     pub parked: Vec<(String, f64)>,
     /// Links whose collision shapes are left out, such as markers between the fingers.
     pub no_collision_links: Vec<String>,
-    /// Link between the fingertips; its x axis points along the fingers, its y axis across them.
-    pub grasp_link: String,
-    /// Rotation of the grasp frame relative to that link, if the link's axes differ: about its
-    /// fixed x, y and z axes, in this order. Unit: radians.
-    pub grasp_turned_rad: [f64; 3],
-    /// Origin of the grasp frame in that link's frame, if it differs from the link's. Unit: metres.
-    pub grasp_offset_m: [f64; 3],
-    /// Links of the fingertips, left then right; one of them may be fixed.
-    pub finger_links: [String; 2],
-    /// Link of the depth camera, whose x axis points forwards and whose z axis up in the image; or
-    /// [`RobotProfile::MAP`], if the camera is fixed beside the robot.
-    pub camera_link: String,
-    /// Rotation of the camera's frame relative to that link, if the link's axes differ: about its
-    /// fixed x, y and z axes, in this order. Unit: radians.
-    pub camera_turned_rad: [f64; 3],
-    /// Position of the lens in that link's frame, if it differs from the link's origin; in the
-    /// world's, if the camera is fixed there. Unit: metres.
-    pub camera_offset_m: [f64; 3],
-    /// Widest gap between the fingers. Unit: metres.
-    pub max_opening_m: f64,
-    /// Arm posture for driving, in the order of `arm_joints`. Units: metres or radians.
-    pub home: Vec<f64>,
-    /// Seeds of inverse kinematics: arm postures in the order of `arm_joints`.
-    pub postures: Vec<Vec<f64>>,
-    /// Friction coefficient of the fingertips.
-    pub finger_friction: f64,
-    /// Closing force of one finger; of a suction cup, its greatest pull. Unit: newtons.
-    pub grip_force_n: f64,
-    /// The suction cup of a gripper without fingers: both `finger_links` are then the `grasp_link`,
-    /// whose grasp frame is at the cup's lip with its x axis along the axis of the cup;
-    /// `max_opening_m` is the cup's diameter.
-    pub suction: Option<Suction>,
     /// Collision meshes by the file name in the URDF, in the file's own scale.
     pub meshes: BTreeMap<String, Vec<Shape>>,
     /// The same meshes before they were divided into convex pieces, which fill hollows; empty if
@@ -91,6 +53,113 @@ pub struct RobotProfile {
     pub surfaces: BTreeMap<String, Vec<Arc<Mesh>>>,
     /// Digest of profile, URDF and meshes.
     pub digest: String,
+}
+
+impl RobotCore {
+    /// Joints of a planar base that is added below the URDF's root: x, y, heading.
+    pub const PLANAR_JOINTS: [&'static str; 3] =
+        ["planar_x_joint", "planar_y_joint", "planar_heading_joint"];
+}
+
+/// A robot with all of its roles: what its profile states, and what was found on its model for the
+/// roles that the profile leaves out (see [`StatedRobot`](crate::StatedRobot)).
+#[derive(Debug, Clone, PartialEq)]
+pub struct RobotProfile {
+    /// Its links and joints, and its place.
+    pub core: RobotCore,
+    /// Joints that position the hand (lift and arm), from the base outwards.
+    pub arm_joints: Vec<String>,
+    /// Its gripper.
+    pub hand: Hand,
+    /// The depth camera, whose x axis points forwards and whose z axis up in the image. Its link is
+    /// [`RobotProfile::MAP`] if the camera is fixed beside the robot: its frame is in the world's
+    /// then.
+    pub camera: LinkFrame,
+    /// Arm posture for driving, in the order of `arm_joints`. Units: metres or radians.
+    pub home: Vec<f64>,
+    /// Seeds of inverse kinematics: arm postures in the order of `arm_joints`.
+    pub postures: Vec<Vec<f64>>,
+}
+
+impl RobotProfile {
+    /// The link of a camera that is fixed beside the robot: its pose is in the frame of the map,
+    /// whose z axis points up from the floor.
+    pub const MAP: &'static str = "map";
+
+    /// Returns the roles of its joints and links.
+    pub fn roles(&self) -> RobotRoles<'_> {
+        RobotRoles {
+            core: &self.core,
+            arm_joints: &self.arm_joints,
+            hand: &self.hand,
+            camera: &self.camera,
+        }
+    }
+}
+
+/// A robot with the roles of its joints and links, which decide about its model; its postures may
+/// still be unknown.
+#[derive(Debug, Clone, Copy)]
+pub struct RobotRoles<'a> {
+    /// Its links and joints, and its place.
+    pub core: &'a RobotCore,
+    /// See [`RobotProfile::arm_joints`].
+    pub arm_joints: &'a [String],
+    /// Its gripper.
+    pub hand: &'a Hand,
+    /// See [`RobotProfile::camera`].
+    pub camera: &'a LinkFrame,
+}
+
+/// A frame on a link of the URDF.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinkFrame {
+    /// The link.
+    pub link: String,
+    /// Origin of the frame in the link's frame, if it differs from the link's. Unit: metres.
+    pub offset_m: [f64; 3],
+    /// Rotation of the frame relative to the link, if the link's axes differ: about its fixed x, y
+    /// and z axes, in this order. Unit: radians.
+    pub turned_rad: [f64; 3],
+}
+
+/// A gripper: its fingers, or its suction cup.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hand {
+    /// The frame between the fingertips: its x axis points along the fingers, its y axis across
+    /// them.
+    pub grasp: LinkFrame,
+    /// Joints with motors that move the fingers: left then right, or one for both or for the only
+    /// finger that moves. Further ones close further fingers with these. Joints that mimic them
+    /// follow.
+    pub finger_joints: Vec<String>,
+    /// Links of the fingertips, left then right; one of them may be fixed.
+    pub finger_links: [String; 2],
+    /// Widest gap between the fingers. Unit: metres.
+    pub max_opening_m: f64,
+    /// Friction coefficient of the fingertips.
+    pub finger_friction: f64,
+    /// Closing force of one finger; of a suction cup, its greatest pull. Unit: newtons.
+    pub grip_force_n: f64,
+    /// The suction cup of a gripper without fingers: both `finger_links` are then the link of the
+    /// grasp frame, which is at the cup's lip with its x axis along the axis of the cup;
+    /// `max_opening_m` is the cup's diameter.
+    pub suction: Option<Suction>,
+}
+
+impl Hand {
+    /// Returns a suction cup with its lip at this frame.
+    pub fn of_cup(grasp: LinkFrame, cup: Suction) -> Self {
+        Self {
+            finger_joints: Vec::new(),
+            finger_links: [grasp.link.clone(), grasp.link.clone()],
+            max_opening_m: 2.0 * cup.radius_m,
+            finger_friction: cup.friction,
+            grip_force_n: cup.force_n,
+            suction: Some(cup),
+            grasp,
+        }
+    }
 }
 
 /// A suction cup, which holds a surface by a seal.
@@ -105,28 +174,6 @@ pub struct Suction {
     pub radius_m: f64,
     /// Friction coefficient between the lip and a surface.
     pub friction: f64,
-}
-
-impl RobotProfile {
-    /// The `camera_link` of a camera that is fixed beside the robot: its pose is in the frame of
-    /// the map, whose z axis points up from the floor.
-    pub const MAP: &'static str = "map";
-    /// Joints of a planar base that is added below the URDF's root: x, y, heading.
-    pub const PLANAR_JOINTS: [&'static str; 3] =
-        ["planar_x_joint", "planar_y_joint", "planar_heading_joint"];
-
-    /// Returns the profile with a suction cup instead of fingers. The `grasp_link` must be known.
-    pub fn with_cup(self, cup: Suction) -> Self {
-        Self {
-            finger_joints: Vec::new(),
-            finger_links: [self.grasp_link.clone(), self.grasp_link.clone()],
-            max_opening_m: 2.0 * cup.radius_m,
-            finger_friction: cup.friction,
-            grip_force_n: cup.force_n,
-            suction: Some(cup),
-            ..self
-        }
-    }
 }
 
 impl Suction {

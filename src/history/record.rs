@@ -256,7 +256,7 @@ impl RunScene {
     pub fn of(scene: &Scene) -> Self {
         Self {
             world: scene.world.clone(),
-            robot: scene.robot.profile.name.clone(),
+            robot: scene.robot.profile.core.name.clone(),
             base: scene.robot.base,
             noise: crate::noise(scene).into(),
             designators: scene.designators.clone(),

@@ -138,8 +138,8 @@ pub fn introduction(world: &World, worker: usize, privileged: bool) -> Introduct
         control_period_s: world.tick_secs(),
         privileged,
         robot: Robot {
-            name: &profile.name,
-            urdf: &profile.urdf.text,
+            name: &profile.core.name,
+            urdf: &profile.core.urdf.text,
             joints: joints
                 .iter()
                 .zip(roles)
@@ -149,15 +149,15 @@ pub fn introduction(world: &World, worker: usize, privileged: bool) -> Introduct
             arm_joints: names(&layout.arm),
             gripper_joints: names(&layout.gripper.joints().collect::<Vec<_>>()),
             head_joints: names(&layout.head),
-            mount_height_m: profile.mount_height_m,
+            mount_height_m: profile.core.mount_height_m,
             home: &profile.home,
             postures: &profile.postures,
-            tool_link: &profile.grasp_link,
-            tool_turned_rad: profile.grasp_turned_rad,
-            max_opening_m: profile.max_opening_m,
-            grip_force_n: profile.grip_force_n,
+            tool_link: &profile.hand.grasp.link,
+            tool_turned_rad: profile.hand.grasp.turned_rad,
+            max_opening_m: profile.hand.max_opening_m,
+            grip_force_n: profile.hand.grip_force_n,
             camera: Camera {
-                link: &profile.camera_link,
+                link: &profile.camera.link,
                 width: camera.width,
                 height: camera.height,
                 horizontal_fov_rad: camera.field_of_view_rad,

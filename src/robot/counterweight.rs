@@ -92,11 +92,11 @@ mod tests {
     fn a_beam_needs_its_weight_times_its_lever() {
         let path = Path::new("models/robots/mobile_manipulator.toml");
         let mut profile = actcheck_config::robot::read(&Files::Shipped, path)
-            .expect("the shipped robot is valid");
-        assert_eq!(
-            RobotModel::read(&profile).expect("it is valid").balanced,
-            []
-        );
+            .expect("the shipped robot is valid")
+            .complete()
+            .expect("it states all roles");
+        let shipped = RobotModel::read(profile.roles()).expect("it is valid");
+        assert_eq!(shipped.balanced, []);
         let beam = |effort: f64| {
             format!(
                 "<robot name=\"beam\"><link name=\"base\"/><link name=\"beam\"><inertial><origin xyz=\"0.4 0 0\"/>\
@@ -107,10 +107,10 @@ mod tests {
         };
         let mut read = |effort: f64| {
             let urdf = Source::new("beam.urdf", beam(effort));
-            profile =
-                actcheck_config::robot::with_urdf(profile.clone(), urdf).expect("it is a URDF");
-            (profile.arm_joints, profile.finger_joints) = (vec!["hinge".to_owned()], Vec::new());
-            RobotModel::read(&profile).expect("it is valid")
+            profile.core = actcheck_config::robot::with_urdf(profile.core.clone(), urdf)
+                .expect("it is a URDF");
+            profile.arm_joints = vec!["hinge".to_owned()];
+            RobotModel::read(profile.roles()).expect("it is valid")
         };
         let model = read(5.0);
         let [balanced] = model.balanced.as_slice() else {

@@ -14,8 +14,8 @@ use crate::kinematics::motion;
 use crate::mechanism::lead_with_carriers;
 use crate::needed::Needed;
 use actcheck_data::{
-    LEAST_LINK_KG, Mesh, ModelTree, Part, Pose, RobotProfile, Shape, TreeGeometry, TreeJoint,
-    TreeLink, TreeMotion, bounds,
+    LEAST_LINK_KG, Mesh, ModelTree, Part, Pose, RobotCore, RobotRoles, Shape, TreeGeometry,
+    TreeJoint, TreeLink, TreeMotion, bounds,
 };
 use actcheck_geometry::Material;
 
@@ -24,20 +24,20 @@ use actcheck_geometry::Material;
 const LEAST_INERTIA: f64 = 4e-7;
 
 impl RobotModel {
-    /// Reads the robot of a profile.
+    /// Reads a robot with these roles: joints without one are rigid.
     ///
     /// # Errors
     /// [`RobotError`] if the robot is not a single tree, or has unsupported joints.
-    pub fn read(profile: &RobotProfile) -> Result<Self, RobotError> {
-        let name = profile.urdf.name.to_string();
-        let robot = &*profile.tree;
-        if robot.links.is_empty() {
-            return Err(RobotError::Urdf {
-                name,
-                reason: "it has no links".to_owned(),
-            });
-        }
-        Folding::new(robot, name, profile)?.fold(profile)
+    pub fn read(roles: RobotRoles<'_>) -> Result<Self, RobotError> {
+        Folding::new(roles.core)?.fold(roles.core, Some(roles))
+    }
+
+    /// Reads a robot whose roles are not known yet: all joints move, but those that are parked.
+    ///
+    /// # Errors
+    /// As [`RobotModel::read`].
+    pub fn without_roles(core: &RobotCore) -> Result<Self, RobotError> {
+        Folding::new(core)?.fold(core, None)
     }
 }
 
@@ -54,11 +54,12 @@ struct Folding<'a> {
 }
 
 impl<'a> Folding<'a> {
-    fn new(
-        robot: &'a ModelTree,
-        name: String,
-        profile: &'a RobotProfile,
-    ) -> Result<Self, RobotError> {
+    fn new(core: &'a RobotCore) -> Result<Self, RobotError> {
+        let (robot, name) = (&*core.tree, core.urdf.name.to_string());
+        if robot.links.is_empty() {
+            let reason = "it has no links".to_owned();
+            return Err(RobotError::Urdf { name, reason });
+        }
         let links = robot
             .links
             .iter()
@@ -100,13 +101,17 @@ impl<'a> Folding<'a> {
             robot,
             links,
             children,
-            meshes: &profile.meshes,
-            surfaces: &profile.surfaces,
+            meshes: &core.meshes,
+            surfaces: &core.surfaces,
             out,
         })
     }
 
-    fn fold(mut self, profile: &RobotProfile) -> Result<RobotModel, RobotError> {
+    fn fold(
+        mut self,
+        core: &RobotCore,
+        roles: Option<RobotRoles<'_>>,
+    ) -> Result<RobotModel, RobotError> {
         let is_child = |name: &str| self.robot.joints.iter().any(|joint| joint.child == name);
         let roots: Vec<&str> = self
             .robot
@@ -122,10 +127,10 @@ impl<'a> Folding<'a> {
                 reason,
             });
         };
-        if let (true, Some(names)) = (profile.planar_base, &profile.base_joints) {
+        if let (true, Some(names)) = (core.planar_base, &core.base_joints) {
             self.add_planar_base(names);
         }
-        let needed = Needed::of(self.robot, profile);
+        let needed = Needed::of(core, roles);
         self.out.links.push(Link::empty(root));
         // Links whose children are still to be visited, with the merged link that they belong to.
         let mut open = vec![(*root, self.out.links.len() - 1, Isometry3::identity())];
@@ -134,7 +139,7 @@ impl<'a> Folding<'a> {
                 name,
                 into,
                 &at,
-                !profile
+                !core
                     .no_collision_links
                     .iter()
                     .any(|without| without == name),
@@ -189,11 +194,11 @@ impl<'a> Folding<'a> {
                 link.inertia = Matrix3::identity() * LEAST_INERTIA;
             }
         }
-        if needed.is_chosen() {
+        if let Some(roles) = roles {
             self.out.assumed = assume_efforts(&mut self.out.joints);
             self.out.assumed_speeds = assume_speeds(&mut self.out.joints);
+            balance(&mut self.out, roles.arm_joints);
         }
-        balance(&mut self.out, &profile.arm_joints);
         Ok(self.out)
     }
 

@@ -1,4 +1,4 @@
-//! Resolves the joints and links of a profile in the URDF.
+//! Resolves the joints and links with a role in the URDF.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,7 @@ use crate::gripper::{Probe, links_of_fingers};
 use crate::kinematics::Mount;
 use crate::wrist;
 use crate::{Gripper, GripperFault, Robot, RobotError};
-use actcheck_data::RobotProfile;
+use actcheck_data::{LinkFrame, RobotProfile, RobotRoles};
 
 /// Indices of the robot's joints by their role.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,7 +27,7 @@ pub struct Layout {
 /// Tolerance of `max_opening_m`, which is often rounded. Unit: metres.
 const OPENING_SLACK_M: f64 = 2e-3;
 
-/// The profile's joints and links, resolved in the URDF.
+/// The joints and links with a role, resolved in the URDF.
 #[derive(Debug, Clone)]
 pub struct Named {
     /// The joints by role.
@@ -43,37 +43,38 @@ pub struct Named {
 }
 
 impl Named {
-    /// Finds the joints and links that a profile names.
+    /// Finds the joints and links that have these roles.
     ///
     /// # Errors
     /// [`RobotError`] for the first missing or unsupported one.
-    pub fn find(profile: &RobotProfile, model: &RobotModel) -> Result<Self, RobotError> {
+    pub fn find(roles: RobotRoles<'_>, model: &RobotModel) -> Result<Self, RobotError> {
+        let RobotRoles {
+            core,
+            arm_joints,
+            hand,
+            camera,
+        } = roles;
         let joints = |names: &[String]| {
             names
                 .iter()
                 .map(|name| model.joint(name))
                 .collect::<Result<Vec<_>, _>>()
         };
-        let base = match &profile.base_joints {
+        let base = match &core.base_joints {
             Some([x, y, heading]) => {
                 Some([model.joint(x)?, model.joint(y)?, model.joint(heading)?])
             }
             None => None,
         };
-        let [left_link, right_link] = &profile.finger_links;
-        let grasp = frame(
-            model,
-            &profile.grasp_link,
-            profile.grasp_offset_m,
-            profile.grasp_turned_rad,
-        )?;
-        let camera = camera(model, profile)?;
+        let [left_link, right_link] = &hand.finger_links;
+        let grasp = frame(model, &hand.grasp)?;
+        let camera = mounted(model, camera)?;
         let finger_links = [model.frame(left_link)?.0, model.frame(right_link)?.0];
         let layout = Layout {
             base,
-            arm: joints(&profile.arm_joints)?,
-            head: joints(&profile.head_joints)?,
-            gripper: Gripper::find(profile, model, finger_links, grasp)?,
+            arm: joints(arm_joints)?,
+            head: joints(&core.head_joints)?,
+            gripper: Gripper::of(hand, model, finger_links, grasp)?,
         };
         let probe = Probe::new(model, finger_links, grasp);
         let fingers = links_of_fingers(model, &layout.gripper, &probe);
@@ -137,32 +138,28 @@ impl Named {
     }
 }
 
-/// A frame in a link's frame, moved and turned: the merged link, and the pose in its frame.
+/// A frame on a link: the merged link, and the pose in its frame.
 pub(crate) fn frame(
     model: &RobotModel,
-    link: &str,
-    offset_m: [f64; 3],
-    turned_rad: [f64; 3],
+    frame: &LinkFrame,
 ) -> Result<(usize, Isometry3<f64>), RobotError> {
-    let (link, at) = model.frame(link)?;
-    Ok((link, at * moved(offset_m, turned_rad)))
+    let (link, at) = model.frame(&frame.link)?;
+    Ok((link, at * moved(frame)))
 }
 
-/// The place of the profile's camera: on a link, or fixed in the world.
-pub(crate) fn camera(model: &RobotModel, profile: &RobotProfile) -> Result<Mount, RobotError> {
-    let (link, offset_m) = (&profile.camera_link, profile.camera_offset_m);
-    match frame(model, link, offset_m, profile.camera_turned_rad) {
+/// The place of a camera: on a link, or fixed in the world.
+fn mounted(model: &RobotModel, camera: &LinkFrame) -> Result<Mount, RobotError> {
+    match frame(model, camera) {
         Ok((link, pose)) => Ok(Mount::Link(link, pose)),
         // A link of this name takes precedence: it is where the URDF says.
-        Err(_) if link == RobotProfile::MAP => {
-            Ok(Mount::World(moved(offset_m, profile.camera_turned_rad)))
-        }
+        Err(_) if camera.link == RobotProfile::MAP => Ok(Mount::World(moved(camera))),
         Err(error) => Err(error),
     }
 }
 
-fn moved(offset_m: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Isometry3<f64> {
-    Translation3::from(Vector3::from(offset_m))
+fn moved(frame: &LinkFrame) -> Isometry3<f64> {
+    let [roll, pitch, yaw] = frame.turned_rad;
+    Translation3::from(Vector3::from(frame.offset_m))
         * UnitQuaternion::from_euler_angles(roll, pitch, yaw)
 }
 
@@ -173,10 +170,10 @@ impl Robot {
     /// [`GripperFault::TooNarrow`] if they don't.
     pub fn check(&self) -> Result<(), RobotError> {
         let (profile, widest_m) = (&self.profile, self.named.layout.gripper.widest_m());
-        if profile.max_opening_m > widest_m + OPENING_SLACK_M {
-            let name = profile.urdf.name.to_string();
+        if profile.hand.max_opening_m > widest_m + OPENING_SLACK_M {
+            let name = profile.core.urdf.name.to_string();
             let fault = GripperFault::TooNarrow {
-                stated_m: profile.max_opening_m,
+                stated_m: profile.hand.max_opening_m,
                 widest_m,
             };
             return Err(RobotError::Gripper { name, fault });

@@ -41,7 +41,7 @@ pub use inertia::{Dynamics, Inertias, Twist, inertias};
 pub use kinematics::{GRAVITY, Kinematics, Mount, axis_in_world};
 pub use layout::{Layout, Named};
 pub use measures::RobotMeasures;
-pub use propose::{FingerJoint, Proposal, UnknownHand, complete, is_incomplete, propose};
+pub use propose::{Completed, FingerJoint, Notes, Proposal, UnknownHand, complete, propose};
 pub use robot::Robot;
 pub use self_contact::SelfContact;
 pub use start::geometry;

@@ -90,14 +90,16 @@ mod tests {
 
     use super::*;
     use actcheck_base::{Files, Source};
-    use actcheck_data::RobotProfile;
+    use actcheck_data::{Hand, LinkFrame, RobotCore, RobotProfile};
     use std::path::Path;
 
     /// An arm of one beam of `mass_kg`, 0.5 m long, with two fingers of 50 g.
     fn beam(mass_kg: f64, effort: f64) -> Arc<RobotProfile> {
         let path = Path::new("models/robots/fixed_arm.toml");
         let shipped = actcheck_config::robot::read(&Files::Shipped, path)
-            .expect("the shipped robot is valid");
+            .expect("the shipped robot is valid")
+            .complete()
+            .expect("it states all roles");
         let inertial = |at: &str, mass_kg: f64| {
             format!(
                 "<inertial><origin xyz=\"{at}\"/><mass value=\"{mass_kg}\"/><inertia ixx=\"1e-3\" ixy=\"0\" ixz=\"0\" \
@@ -123,23 +125,31 @@ mod tests {
             finger("left", 0.005),
             finger("right", -0.005),
         );
-        let profile = RobotProfile {
+        let urdf = Source::new("beam.urdf", urdf);
+        let core = actcheck_config::robot::with_urdf(shipped.core, urdf).expect("it is a URDF");
+        let on = |link: &str| LinkFrame {
+            link: link.to_owned(),
+            offset_m: [0.0; 3],
+            turned_rad: [0.0; 3],
+        };
+        Arc::new(RobotProfile {
+            core: RobotCore {
+                head_joints: Vec::new(),
+                mount_height_m: 1.0,
+                ..core
+            },
             arm_joints: vec!["hinge".to_owned()],
+            hand: Hand {
+                grasp: on("tool"),
+                finger_joints: ["left_joint", "right_joint"].map(str::to_owned).to_vec(),
+                finger_links: ["left", "right"].map(str::to_owned),
+                max_opening_m: 0.08,
+                ..shipped.hand
+            },
+            camera: on("base"),
             home: vec![0.0],
             postures: vec![vec![0.0]],
-            head_joints: Vec::new(),
-            finger_joints: ["left_joint", "right_joint"].map(str::to_owned).to_vec(),
-            finger_links: ["left", "right"].map(str::to_owned),
-            max_opening_m: 0.08,
-            grasp_link: "tool".to_owned(),
-            grasp_turned_rad: [0.0; 3],
-            grasp_offset_m: [0.0; 3],
-            camera_link: "base".to_owned(),
-            mount_height_m: 1.0,
-            ..shipped
-        };
-        let urdf = Source::new("beam.urdf", urdf);
-        Arc::new(actcheck_config::robot::with_urdf(profile, urdf).expect("it is a URDF"))
+        })
     }
 
     /// Level, a beam of 2 kg and fingers of 0.1 kg leave 25 N·m − 9.81 m/s² · (2 kg · 0.25 m + 0.1 kg

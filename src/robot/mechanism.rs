@@ -89,7 +89,7 @@ mod tests {
     #[test]
     fn the_bar_that_carries_a_finger_leads() {
         let path = Path::new("models/robots/mobile_manipulator.toml");
-        let mut profile = actcheck_config::robot::read(&Files::Shipped, path)
+        let shipped = actcheck_config::robot::read(&Files::Shipped, path)
             .expect("the shipped robot is valid");
         let joint = |name: &str, parent: &str, more: &str| {
             format!(
@@ -112,11 +112,9 @@ mod tests {
                 "<mimic joint=\"driver\" multiplier=\"-0.5\"/>"
             ),
         );
-        profile = actcheck_config::robot::with_urdf(profile, Source::new("linkage.urdf", text))
-            .expect("it is a URDF");
-        profile.arm_joints = Vec::new();
-        profile.base_joints = None;
-        let model = RobotModel::read(&profile).expect("it is a URDF");
+        let urdf = Source::new("linkage.urdf", text);
+        let core = actcheck_config::robot::with_urdf(shipped.core, urdf).expect("it is a URDF");
+        let model = RobotModel::without_roles(&core).expect("it is a URDF");
         let joints =
             ["driver", "bar", "finger"].map(|name| model.joint(name).expect("it has the joint"));
         let [driver, bar, finger] = joints.map(|idx| &model.joints[idx]);

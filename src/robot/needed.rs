@@ -5,11 +5,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use actcheck_data::{ModelTree, RobotProfile, TreeJoint, TreeMotion};
+use actcheck_data::{RobotCore, RobotRoles, TreeJoint, TreeMotion};
 
 /// The movable joints of a robot, and the positions of the others.
 pub(super) struct Needed<'a> {
-    /// `None` if the profile has no roles yet: all joints move, but those that it parks.
+    /// `None` if the roles are not known yet: all joints move, but those that are parked.
     moving: Option<BTreeSet<&'a str>>,
     joints: BTreeMap<&'a str, &'a TreeJoint>,
     /// Positions of rigid joints that the profile gives.
@@ -17,59 +17,16 @@ pub(super) struct Needed<'a> {
 }
 
 impl<'a> Needed<'a> {
-    pub(super) fn of(robot: &'a ModelTree, profile: &'a RobotProfile) -> Self {
-        let joints: BTreeMap<&str, &TreeJoint> = robot
-            .joints
-            .iter()
-            .map(|joint| (joint.name.as_str(), joint))
-            .collect();
-        let parked = profile
-            .parked
-            .iter()
-            .map(|(name, position)| (name.as_str(), *position))
-            .collect();
-        let has_hand = !profile.finger_joints.is_empty() || profile.suction.is_some();
-        if profile.arm_joints.is_empty() || !has_hand {
-            return Self {
-                moving: None,
-                joints,
-                parked,
-            };
-        }
-        let base = profile.base_joints.iter().flatten();
-        let roles = base
-            .chain(&profile.arm_joints)
-            .chain(&profile.head_joints)
-            .chain(&profile.finger_joints);
-        let mut moving: BTreeSet<&str> = roles
-            .chain(&profile.other_joints)
-            .map(String::as_str)
-            .collect();
-        // A coupling moves both of its joints.
-        loop {
-            let n_known = moving.len();
-            for joint in &robot.joints {
-                if let Some(mimic) = &joint.mimic {
-                    let pair = [joint.name.as_str(), mimic.leader.as_str()];
-                    if pair.iter().any(|name| moving.contains(name)) {
-                        moving.extend(pair);
-                    }
-                }
-            }
-            if moving.len() == n_known {
-                break;
-            }
-        }
+    pub(super) fn of(core: &'a RobotCore, roles: Option<RobotRoles<'a>>) -> Self {
+        let joints = core.tree.joints.iter();
+        let parked = core.parked.iter();
         Self {
-            moving: Some(moving),
-            joints,
-            parked,
+            moving: roles.map(moving),
+            joints: joints.map(|joint| (joint.name.as_str(), joint)).collect(),
+            parked: parked
+                .map(|(name, position)| (name.as_str(), *position))
+                .collect(),
         }
-    }
-
-    /// Whether the profile has roles, which select the joints.
-    pub(super) fn is_chosen(&self) -> bool {
-        self.moving.is_some()
     }
 
     /// Whether the simulation moves a joint. A coupling with the factor 0 holds it where it is.
@@ -115,6 +72,39 @@ impl<'a> Needed<'a> {
         }
         let parked = self.parked.get(at.name.as_str()).copied().unwrap_or(0.0);
         within(joint, factor * within(at, parked) + offset)
+    }
+}
+
+/// The joints with a role, and those coupled to them.
+fn moving(roles: RobotRoles<'_>) -> BTreeSet<&str> {
+    let RobotCore {
+        tree,
+        base_joints,
+        head_joints,
+        other_joints,
+        ..
+    } = roles.core;
+    let base = base_joints.iter().flatten();
+    let named = base
+        .chain(roles.arm_joints)
+        .chain(head_joints)
+        .chain(&roles.hand.finger_joints)
+        .chain(other_joints);
+    let mut moving: BTreeSet<&str> = named.map(String::as_str).collect();
+    // A coupling moves both of its joints.
+    loop {
+        let n_known = moving.len();
+        for joint in &tree.joints {
+            if let Some(mimic) = &joint.mimic {
+                let pair = [joint.name.as_str(), mimic.leader.as_str()];
+                if pair.iter().any(|name| moving.contains(name)) {
+                    moving.extend(pair);
+                }
+            }
+        }
+        if moving.len() == n_known {
+            return moving;
+        }
     }
 }
 

@@ -31,8 +31,8 @@ impl Robot {
     /// # Errors
     /// [`RobotError`] if profile and file don't match.
     pub fn compile(profile: &Arc<RobotProfile>) -> Result<Self, RobotError> {
-        let model = RobotModel::read(profile)?;
-        let named = Named::find(profile, &model)?;
+        let model = RobotModel::read(profile.roles())?;
+        let named = Named::find(profile.roles(), &model)?;
         let (passing, hand) = (named.passing(&model), named.links_of_hand(&model));
         Ok(Self {
             profile: Arc::clone(profile),

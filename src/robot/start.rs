@@ -34,7 +34,7 @@ impl Robot {
         RobotStart {
             profile: Arc::clone(&self.profile),
             base: [0.0; 3],
-            root_height_m: self.profile.mount_height_m,
+            root_height_m: self.profile.core.mount_height_m,
             knows: Arc::new([]),
         }
     }
@@ -56,7 +56,7 @@ fn home(profile: &RobotProfile, model: &RobotModel, named: &Named, base: [f64; 3
     named
         .layout
         .gripper
-        .set(&mut positions, profile.max_opening_m / 2.0);
+        .set(&mut positions, profile.hand.max_opening_m / 2.0);
     for idx in named.layout.gripper.joints() {
         positions[idx] = positions[idx].clamp(model.joints[idx].lower, model.joints[idx].upper);
     }
@@ -82,7 +82,7 @@ fn root_of(start: &RobotStart, layout: &Layout) -> Isometry3<f64> {
         Some(_) => Isometry3::translation(0.0, 0.0, start.root_height_m),
         None => Pose::upright(
             [x, y, start.root_height_m],
-            heading + start.profile.mount_turned_rad,
+            heading + start.profile.core.mount_turned_rad,
         )
         .to_isometry(),
     }
@@ -99,7 +99,9 @@ pub(crate) mod tests {
     pub(crate) fn lonely() -> (Kinematics, Layout, Vec<f64>) {
         let path = Path::new("models/robots/mobile_manipulator.toml");
         let profile = actcheck_config::robot::read(&Files::Shipped, path)
-            .expect("the shipped robot is valid");
+            .expect("the shipped robot is valid")
+            .complete()
+            .expect("it states all roles");
         let start = RobotStart {
             profile: Arc::new(profile),
             base: [-1.0, 0.3, 0.4],

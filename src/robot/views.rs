@@ -24,17 +24,19 @@ impl Robot {
                 .iter()
                 .zip(arm)
                 .for_each(|(joint, position)| positions[*joint] = *position);
-            layout.gripper.set(&mut positions, profile.max_opening_m);
+            layout
+                .gripper
+                .set(&mut positions, profile.hand.max_opening_m);
             let base = layout.base.map_or(0, |[.., heading]| heading + 1);
             let frame = |name: String, pose: &Isometry3<f64>| (name, Pose::from_isometry(pose));
             let frames = vec![
                 frame("base".to_owned(), &kinematics.links(&positions)[base]),
                 frame(
-                    format!("grasp: {}", profile.grasp_link),
+                    format!("grasp: {}", profile.hand.grasp.link),
                     &kinematics.grasp(&positions),
                 ),
                 frame(
-                    format!("camera: {}", profile.camera_link),
+                    format!("camera: {}", profile.camera.link),
                     &kinematics.camera(&positions),
                 ),
             ];

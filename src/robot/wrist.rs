@@ -84,25 +84,27 @@ mod tests {
             let path = format!("models/robots/{name}.toml");
             actcheck_config::robot::read(&Files::Shipped, Path::new(&path))
                 .expect("the shipped robot is valid")
+                .complete()
+                .expect("it states all roles")
         };
         for name in ["mobile_manipulator", "fixed_arm"] {
-            let model = RobotModel::read(&read(name)).expect("it is valid");
+            let model = RobotModel::read(read(name).roles()).expect("it is valid");
             assert_eq!(passing(&model), BTreeSet::new(), "{name}");
         }
         let mut profile = read("fixed_arm");
-        let text = profile.urdf.text.replace(
+        let text = profile.core.urdf.text.replace(
             "xyz=\"0 0 0.08\" rpy=\"0 0 0\"/>\n    <axis",
             "xyz=\"0 0 0.01\"/>\n    <axis",
         );
-        assert_ne!(text, *profile.urdf.text);
-        let name = std::sync::Arc::clone(&profile.urdf.name);
+        assert_ne!(text, *profile.core.urdf.text);
+        let name = std::sync::Arc::clone(&profile.core.urdf.name);
         let text = text.replace(
             "radius=\"0.045\" length=\"0.18\"",
             "radius=\"0.1\" length=\"0.2\"",
         );
-        profile = actcheck_config::robot::with_urdf(profile, Source::new(name, text))
+        profile.core = actcheck_config::robot::with_urdf(profile.core, Source::new(name, text))
             .expect("it is a URDF");
-        let model = RobotModel::read(&profile).expect("it is valid");
+        let model = RobotModel::read(profile.roles()).expect("it is valid");
         let names =
             |pair: &(usize, usize)| [pair.0, pair.1].map(|link| model.links[link].name.clone());
         let found: Vec<[String; 2]> = passing(&model).iter().map(names).collect();

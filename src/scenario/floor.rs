@@ -62,7 +62,7 @@ impl SceneBuilder<'_> {
         if let Some(ranges) = self.space.start {
             return self.start_within(ranges);
         }
-        let [least, nominal, most] = match (self.space.robot.on_surface, self.is_fixed()) {
+        let [least, nominal, most] = match (self.space.robot.core.on_surface, self.is_fixed()) {
             (true, _) => MOUNTED_GAP_M,
             (false, true) => FIXED_GAP_M,
             (false, false) => BASE_GAP_M,
@@ -82,7 +82,7 @@ impl SceneBuilder<'_> {
     /// an arm on the surface, and targets are within its reach. Returns `None` for all other
     /// robots.
     pub(super) fn mount(&mut self, surface: &Surface) -> Result<Option<[f64; 3]>, Discard> {
-        let robot = &self.space.robot;
+        let robot = &self.space.robot.core;
         if !robot.on_surface && robot.reach_m.is_none() {
             return Ok(None);
         }
@@ -111,12 +111,12 @@ impl SceneBuilder<'_> {
 
     /// Whether the robot has no mobile base.
     fn is_fixed(&self) -> bool {
-        self.space.robot.base_joints.is_none()
+        self.space.robot.core.base_joints.is_none()
     }
 
     /// The space that the robot occupies at the start.
     fn own_room(&self, base: [f64; 3]) -> Solid {
-        let (radius, foot_m) = match (self.space.robot.on_surface, self.is_fixed()) {
+        let (radius, foot_m) = match (self.space.robot.core.on_surface, self.is_fixed()) {
             (true, _) => (MOUNTED_ROOM_M, self.ground_m + MOUNTED_FOOT_M),
             (false, true) => (FIXED_ROOM_M, FOOT_M),
             (false, false) => (BASE_ROOM_M, FOOT_M),

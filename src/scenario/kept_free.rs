@@ -32,7 +32,7 @@ const SURFACES: [&str; 2] = ["objectSurface", "placeSurface"];
 ///
 /// Without `[nav] may_block`, no such scene is drawn.
 pub fn is_blocked(scene: &Scene) -> bool {
-    if scene.robot.profile.base_joints.is_none() {
+    if scene.robot.profile.core.base_joints.is_none() {
         return false;
     }
     let standing = scene

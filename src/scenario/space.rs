@@ -72,46 +72,17 @@ impl Space {
     /// is not a class of the ontology (S005), a model has no surface (S006), an object does not fit
     /// on a surface (S007), objects have no surface (S008), or a world lacks all named surfaces or
     /// locations (S009), or an action of a test can't have a designator (S011) or its value (S012).
-    pub fn new(campaign: &Campaign, ontology: &Ontology) -> Result<Self, Diagnostics> {
-        let mut found = Diagnostics::new();
-        check_tests(campaign, ontology, &mut found);
-        check_tables(campaign, ontology, &mut found);
-        let surfaces = models(campaign, "objectSurface");
-        let targets = models(campaign, "pickObject");
-        let others = if campaign.other_counts.any() {
-            models(campaign, "surfaceObjects")
-        } else {
-            Vec::new()
-        };
-        check_categories(campaign, ontology, &mut found);
-        check_surfaces(campaign, &mut found);
-        let has_platform = !surfaces.is_empty() || !campaign.worlds.is_empty();
-        let has_objects = !targets.is_empty() || !others.is_empty();
-        if has_objects && !has_platform {
-            let key = if targets.is_empty() {
-                "surfaceObjects"
-            } else {
-                "pickObject"
-            };
-            let message = "there are objects, but no surface to place them on";
-            found.push(
-                campaign
-                    .fault("S008", key, message)
-                    .help("add `[objectSurface]` with `object_surfaces = [\"coffee_table\"]`"),
-            );
-        }
-        let named_worlds = campaign.candidates.get("world").into_iter().flatten();
-        let worlds: Vec<Surroundings> = named_worlds
-            .filter_map(|name| campaign.worlds.get(name))
-            .map(|map| Surroundings::new(map, &campaign.models))
-            .collect();
-        check_tops(campaign, &surfaces, &worlds, &mut found);
-        check_worlds(campaign, &worlds, &mut found);
+    pub fn new(
+        campaign: &Campaign,
+        ontology: &Ontology,
+        robot: &Arc<RobotProfile>,
+    ) -> Result<Self, Diagnostics> {
+        let worlds = checked(campaign, ontology)?;
         let names = campaign
             .candidates
             .iter()
             .filter(|(name, _)| !is_of_objects(name));
-        config::in_order_of_place(found).or(Self {
+        Ok(Self {
             tests: campaign.tests.len(),
             steps: campaign
                 .tests
@@ -119,9 +90,9 @@ impl Space {
                 .map(|test| test.iter().map(|step| step.values.clone()).collect())
                 .collect(),
             drives: drives(campaign),
-            surfaces,
-            targets,
-            others,
+            surfaces: models(campaign, "objectSurface"),
+            targets: models(campaign, "pickObject"),
+            others: others(campaign),
             other_counts: campaign.other_counts,
             worlds,
             surface_names: candidates(campaign, "objectSurface"),
@@ -139,11 +110,19 @@ impl Space {
             names: names
                 .map(|(name, values)| (name.clone(), values.clone()))
                 .collect(),
-            robot: Arc::clone(&campaign.robot),
+            robot: Arc::clone(robot),
             knows: known_kinds(campaign),
             physics: campaign.physics.clone(),
             sensing: campaign.sensing.clone(),
         })
+    }
+
+    /// Checks a configuration whose robot is not known.
+    ///
+    /// # Errors
+    /// As [`Space::new`].
+    pub fn check(campaign: &Campaign, ontology: &Ontology) -> Result<(), Diagnostics> {
+        checked(campaign, ontology).map(drop)
     }
 
     /// Number of tests.
@@ -152,9 +131,43 @@ impl Space {
     }
 }
 
+/// The worlds of a configuration without faults.
+fn checked(campaign: &Campaign, ontology: &Ontology) -> Result<Vec<Surroundings>, Diagnostics> {
+    let mut found = Diagnostics::new();
+    check_tests(campaign, ontology, &mut found);
+    check_tables(campaign, ontology, &mut found);
+    let surfaces = models(campaign, "objectSurface");
+    let targets = models(campaign, "pickObject");
+    check_categories(campaign, ontology, &mut found);
+    check_surfaces(campaign, &mut found);
+    let has_platform = !surfaces.is_empty() || !campaign.worlds.is_empty();
+    let has_objects = !targets.is_empty() || !others(campaign).is_empty();
+    if has_objects && !has_platform {
+        let key = if targets.is_empty() {
+            "surfaceObjects"
+        } else {
+            "pickObject"
+        };
+        let message = "there are objects, but no surface to place them on";
+        found.push(
+            campaign
+                .fault("S008", key, message)
+                .help("add `[objectSurface]` with `object_surfaces = [\"coffee_table\"]`"),
+        );
+    }
+    let named_worlds = campaign.candidates.get("world").into_iter().flatten();
+    let worlds: Vec<Surroundings> = named_worlds
+        .filter_map(|name| campaign.worlds.get(name))
+        .map(|map| Surroundings::new(map, &campaign.models))
+        .collect();
+    check_tops(campaign, &surfaces, &worlds, &mut found);
+    check_worlds(campaign, &worlds, &mut found);
+    config::in_order_of_place(found).or(worlds)
+}
+
 /// Position of the first driving action of each test, if the robot can drive.
 fn drives(campaign: &Campaign) -> Vec<Option<usize>> {
-    let mobile = campaign.robot.base_joints.is_some();
+    let mobile = campaign.robot.core.base_joints.is_some();
     let first = |test: &Vec<Step>| {
         test.iter()
             .position(|step| mobile && step.action == DRIVING)
@@ -188,6 +201,14 @@ fn models(campaign: &Campaign, designator: &str) -> Vec<Arc<ObjectModel>> {
     names
         .filter_map(|name| campaign.models.get(name).cloned())
         .collect()
+}
+
+/// The models of other objects, if there are any in a scene.
+fn others(campaign: &Campaign) -> Vec<Arc<ObjectModel>> {
+    match campaign.other_counts.any() {
+        true => models(campaign, "surfaceObjects"),
+        false => Vec::new(),
+    }
 }
 
 fn candidates(campaign: &Campaign, designator: &str) -> Vec<String> {

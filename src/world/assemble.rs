@@ -85,7 +85,7 @@ pub(super) fn insert_links(
             own_joint.is_some_and(|joint| named.layout.gripper.moves_further_finger(joint));
         let is_finger = is_further || named.finger_links.contains(&idx);
         let friction = if is_finger {
-            profile.finger_friction
+            profile.hand.finger_friction
         } else {
             LINK_FRICTION
         };
@@ -125,7 +125,7 @@ pub(super) fn links_on_floor(
     let Layout {
         arm, head, gripper, ..
     } = &named.layout;
-    let mut on_floor = vec![profile.planar_base];
+    let mut on_floor = vec![profile.core.planar_base];
     for (idx, joint) in model.joints.iter().enumerate() {
         let lifted = arm.contains(&idx) || head.contains(&idx) || gripper.contains(idx);
         on_floor.push(on_floor[joint.parent] && !lifted);
@@ -169,7 +169,7 @@ pub(super) fn insert_joints(
     let mut motors = Vec::with_capacity(model.joints.len());
     for (idx, joint) in model.joints.iter().enumerate() {
         let handle = insert_joint(engine, joint, idx, bodies).ok_or_else(|| RobotError::Urdf {
-            name: profile.urdf.name.to_string(),
+            name: profile.core.urdf.name.to_string(),
             reason: format!("joint `{}` closes a loop", joint.name),
         })?;
         let gripper = &named.layout.gripper;
@@ -182,7 +182,7 @@ pub(super) fn insert_joints(
         let (saturation, max_effort, damping_secs) =
             match gripper.lever_m(idx).zip(gripper.effort_per_n(idx)) {
                 Some((lever_m, effort_per_n)) => {
-                    let effort = joint.effort.min(profile.grip_force_n * effort_per_n);
+                    let effort = joint.effort.min(profile.hand.grip_force_n * effort_per_n);
                     (SATURATION_M / lever_m, effort, FINGER_DAMPING_SECS)
                 }
                 // The coupling moves it.

@@ -237,12 +237,13 @@ mod tests {
         let mut profile = bodies(&open).robot.profile.as_ref().clone();
         let housing = "<link name=\"head_camera_link\"><collision><geometry><box size=\"0.1 0.1 0.1\"/></geometry></collision></link>";
         let text = profile
+            .core
             .urdf
             .text
             .replace("<link name=\"head_camera_link\"/>", housing);
-        assert_ne!(text, *profile.urdf.text);
-        profile = actcheck_config::robot::with_urdf(
-            profile,
+        assert_ne!(text, *profile.core.urdf.text);
+        profile.core = actcheck_config::robot::with_urdf(
+            profile.core,
             actcheck_base::Source::new("housed.urdf", text),
         )
         .expect("it is a URDF");

@@ -169,7 +169,7 @@ impl Drive {
         Command {
             positions: observed.positions,
             gripper_opening_m: observed.gripper_opening_m,
-            grip_force_n: engine.bodies().robot.profile.grip_force_n,
+            grip_force_n: engine.bodies().robot.profile.hand.grip_force_n,
             efforts: Vec::new(),
         }
     }

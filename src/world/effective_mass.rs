@@ -77,7 +77,8 @@ mod tests {
         for name in ["mobile_manipulator", "fixed_arm"] {
             let path = format!("models/robots/{name}.toml");
             let profile = actcheck_config::robot::read(&Files::Shipped, Path::new(&path));
-            let world = alone(profile.expect("the shipped robot is valid"));
+            let profile = profile.expect("the shipped robot is valid");
+            let world = alone(profile.complete().expect("it states all roles"));
             let mass_kg =
                 super::least_effective_mass_kg(&bodies(&world).robot).expect("it has a hand");
             assert!(

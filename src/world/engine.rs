@@ -65,7 +65,7 @@ impl Engine {
             steps_per_tick: (steps_per_second / CONTROL_HZ).max(1),
             steps_per_second,
         };
-        let cup = robot.profile.suction.map(Cup::new);
+        let cup = robot.profile.hand.suction.map(Cup::new);
         let mut bodies = Bodies {
             physics,
             objects,

@@ -21,8 +21,9 @@ pub(crate) fn checked(profile: &RobotProfile) -> Result<(), RobotError> {
 
 /// The profile with another URDF.
 fn with_urdf(profile: RobotProfile, text: String) -> RobotProfile {
-    actcheck_config::robot::with_urdf(profile, Source::new("hand.urdf", text))
-        .expect("it is a URDF")
+    let urdf = Source::new("hand.urdf", text);
+    let core = actcheck_config::robot::with_urdf(profile.core, urdf).expect("it is a URDF");
+    RobotProfile { core, ..profile }
 }
 
 /// A hand with fingers of 10 cm whose inner faces are 2 cm off its middle at position 0. The grasp
@@ -30,8 +31,10 @@ fn with_urdf(profile: RobotProfile, text: String) -> RobotProfile {
 /// joints.
 pub(crate) fn hand(left: &str, right: &str, finger_joints: &[&str]) -> RobotProfile {
     let path = Path::new("models/robots/mobile_manipulator.toml");
-    let mut profile =
-        actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
+    let mut profile = actcheck_config::robot::read(&Files::Shipped, path)
+        .expect("the shipped robot is valid")
+        .complete()
+        .expect("it states all roles");
     let inertial = "<inertial><mass value=\"0.1\"/>\
                     <inertia ixx=\"1e-4\" ixy=\"0\" ixz=\"0\" iyy=\"1e-4\" iyz=\"0\" izz=\"1e-4\"/></inertial>";
     let finger = |name: &str, y: f64, joint: &str| {
@@ -54,19 +57,19 @@ pub(crate) fn hand(left: &str, right: &str, finger_joints: &[&str]) -> RobotProf
         finger("right", -0.02, right),
     );
     profile = with_urdf(profile, text);
-    profile.base_joints = None;
+    profile.core.base_joints = None;
     profile.arm_joints = vec!["lift".to_owned()];
     profile.home = vec![0.6];
     profile.postures = Vec::new();
-    profile.head_joints = Vec::new();
-    profile.finger_joints = finger_joints
+    profile.core.head_joints = Vec::new();
+    profile.hand.finger_joints = finger_joints
         .iter()
         .map(|name| (*name).to_owned())
         .collect();
-    profile.finger_links = ["left_finger", "right_finger"].map(str::to_owned);
-    profile.grasp_link = "grasp".to_owned();
-    profile.camera_link = "base".to_owned();
-    profile.max_opening_m = 0.1;
+    profile.hand.finger_links = ["left_finger", "right_finger"].map(str::to_owned);
+    profile.hand.grasp.link = "grasp".to_owned();
+    profile.camera.link = "base".to_owned();
+    profile.hand.max_opening_m = 0.1;
     profile
 }
 
@@ -232,11 +235,11 @@ fn a_gripper_that_cannot_be_measured_is_refused() {
             .diagnostic()
     };
     let mut apart = hand(&left, FIXED, &["left"]);
-    apart.grasp_offset_m = [0.0, 0.0, 0.5];
+    apart.hand.grasp.offset_m = [0.0, 0.0, 0.5];
     let mut inside = hand(&left, FIXED, &["left"]);
-    inside.grasp_link = "left_finger".to_owned();
+    inside.hand.grasp.link = "left_finger".to_owned();
     let mut wide = hand(&left, FIXED, &["left"]);
-    wide.max_opening_m = 0.12;
+    wide.hand.max_opening_m = 0.12;
     for (profile, part) in [
         (apart, "no two surfaces"),
         (inside, "move the `grasp_link`"),
@@ -259,7 +262,7 @@ fn a_mimic_joint_outside_the_gripper_follows_its_leader() {
                 <axis xyz=\"0 0 1\"/><limit lower=\"0\" upper=\"1\" effort=\"900\" velocity=\"0.2\"/>\
                 <mimic joint=\"lift\" multiplier=\"0.5\"/></joint><link name=\"mast_link\"><inertial><mass value=\"5\"/>\
                 <inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" iyy=\"0.01\" iyz=\"0\" izz=\"0.01\"/></inertial></link></robot>";
-    let text = profile.urdf.text.replace("</robot>", mast);
+    let text = profile.core.urdf.text.replace("</robot>", mast);
     profile = with_urdf(profile, text);
     let mut world = alone(profile);
     let at = |world: &World, name: &str| {
@@ -296,10 +299,12 @@ fn inverse_kinematics_moves_the_joints_that_follow_others() {
     let stage = "<link name=\"stage\"/><joint name=\"second\" type=\"prismatic\"><parent link=\"stage\"/>\
                  <child link=\"palm\"/><axis xyz=\"0 0 1\"/><limit lower=\"0\" upper=\"0.1\" effort=\"300\" velocity=\"0.2\"/>\
                  <mimic joint=\"lift\" multiplier=\"0.5\"/></joint></robot>";
-    let text = profile
-        .urdf
-        .text
-        .replacen("<child link=\"palm\"/>", "<child link=\"stage\"/>", 1);
+    let text =
+        profile
+            .core
+            .urdf
+            .text
+            .replacen("<child link=\"palm\"/>", "<child link=\"stage\"/>", 1);
     profile = with_urdf(profile, text.replace("</robot>", stage));
     let world = alone(profile);
     let kinematics = world.kinematics();
@@ -333,7 +338,7 @@ fn fingers_that_overlap_do_not_forbid_postures_of_the_arm() {
     let third = "<joint name=\"third\" type=\"fixed\"><parent link=\"left_finger\"/><child link=\"thumb\"/></joint>\
                  <link name=\"thumb\"><collision><origin xyz=\"0.06 -0.02 0\"/><geometry><box size=\"0.1 0.09 0.03\"/>\
                  </geometry></collision></link></robot>";
-    let text = profile.urdf.text.replace("</robot>", third);
+    let text = profile.core.urdf.text.replace("</robot>", third);
     let thick = with_urdf(profile.clone(), text);
     let world = alone(thick);
     let mut positions = world.observe().positions;
@@ -378,7 +383,7 @@ fn three_fingers(finger_joints: &[&str]) -> RobotProfile {
                  <box size=\"0.1 0.01 0.03\"/></geometry></collision></link><joint name=\"third\" type=\"revolute\">\
                  <parent link=\"palm\"/><child link=\"third_finger\"/><origin xyz=\"0 -0.02 0.04\"/><axis xyz=\"0 0 -1\"/>\
                  <limit lower=\"0\" upper=\"0.6\" effort=\"20\" velocity=\"2\"/></joint></robot>";
-    let text = profile.urdf.text.replace("</robot>", third);
+    let text = profile.core.urdf.text.replace("</robot>", third);
     with_urdf(profile, text)
 }
 
@@ -438,8 +443,8 @@ fn a_third_finger_moves_with_the_others() {
 fn the_links_of_a_gripper_pass_through_each_other_but_its_fingertips_do_not() {
     let (left, right) = (turning(0.0, 0.6), turning(-0.6, 0.0));
     let profile = hand(&left, &right, &["left", "right"]);
-    let model = RobotModel::read(&profile).expect("it is valid");
-    let passing = Named::find(&profile, &model)
+    let model = RobotModel::read(profile.roles()).expect("it is valid");
+    let passing = Named::find(profile.roles(), &model)
         .expect("it is valid")
         .passing(&model);
     let links = |pair: &(usize, usize)| [pair.0, pair.1].map(|link| model.links[link].name.clone());
@@ -457,10 +462,10 @@ fn joints_without_a_role_are_rigid() {
     let mast = "<joint name=\"mast\" type=\"prismatic\"><parent link=\"foot\"/><child link=\"base\"/>\
                 <axis xyz=\"0 0 1\"/><limit lower=\"0.25\" upper=\"1\" effort=\"900\" velocity=\"0.2\"/></joint>\
                 <link name=\"foot\"/></robot>";
-    let text = profile.urdf.text.replace("</robot>", mast);
+    let text = profile.core.urdf.text.replace("</robot>", mast);
     profile = with_urdf(profile, text);
     let names = |profile: &RobotProfile| -> Vec<String> {
-        let model = RobotModel::read(profile).expect("it is valid");
+        let model = RobotModel::read(profile.roles()).expect("it is valid");
         let mut names: Vec<String> = model
             .joints
             .iter()
@@ -480,7 +485,7 @@ fn joints_without_a_role_are_rigid() {
         (height - 0.85).abs() < 1e-6,
         "the mast is at 0.25 m, the lift at 0.6 m: {height} m"
     );
-    profile.other_joints = vec!["mast".to_owned()];
+    profile.core.other_joints = vec!["mast".to_owned()];
     assert_eq!(names(&profile), ["left", "lift", "mast", "right"]);
 }
 
@@ -490,8 +495,8 @@ fn joints_without_a_role_are_rigid() {
 fn coupled_joints_share_the_inertia_of_the_rotors() {
     let (left, right) = (turning(0.0, 0.6), turning(-0.6, 0.0));
     let of = |profile: &RobotProfile| {
-        let model = RobotModel::read(profile).expect("it is a URDF");
-        Named::find(profile, &model)
+        let model = RobotModel::read(profile.roles()).expect("it is a URDF");
+        Named::find(profile.roles(), &model)
             .expect("it has a gripper")
             .layout
             .gripper
@@ -519,8 +524,8 @@ fn coupled_joints_share_the_inertia_of_the_rotors() {
 
 /// The names of the links of both fingers, sorted.
 fn links_of_fingers(profile: &RobotProfile) -> [Vec<String>; 2] {
-    let model = RobotModel::read(profile).expect("it is valid");
-    let fingers = Named::find(profile, &model)
+    let model = RobotModel::read(profile.roles()).expect("it is valid");
+    let fingers = Named::find(profile.roles(), &model)
         .expect("it has a gripper")
         .fingers;
     fingers.map(|finger| {
@@ -546,6 +551,7 @@ fn link(name: &str, shape: &str, joint: &str) -> String {
 /// The hand with these links in addition.
 fn with_links(profile: &RobotProfile, links: &[String]) -> RobotProfile {
     let text = profile
+        .core
         .urdf
         .text
         .replace("</robot>", &format!("{}</robot>", links.concat()));
@@ -594,7 +600,7 @@ fn all_links_that_a_finger_joint_moves_belong_to_the_finger_on_their_side() {
             ),
         ],
     );
-    phalanges.other_joints = vec!["claw_joint".to_owned()];
+    phalanges.core.other_joints = vec!["claw_joint".to_owned()];
     assert_eq!(
         links_of_fingers(&phalanges),
         owned([
@@ -632,7 +638,7 @@ fn all_links_that_a_finger_joint_moves_belong_to_the_finger_on_their_side() {
             &["right_finger", "right_knuckle"]
         ])
     );
-    linkage.finger_links.reverse();
+    linkage.hand.finger_links.reverse();
     assert_eq!(
         links_of_fingers(&linkage),
         owned([
@@ -665,15 +671,16 @@ fn all_links_that_a_finger_joint_moves_belong_to_the_finger_on_their_side() {
             slides,
         )],
     );
-    let carried = ["left", "right"]
-        .iter()
-        .fold(carriage.urdf.text.to_string(), |text, side| {
-            let child = format!("<child link=\"{side}_finger\"/>");
-            text.replace(
-                &format!("<parent link=\"palm\"/>{child}"),
-                &format!("<parent link=\"carriage\"/>{child}"),
-            )
-        });
+    let carried =
+        ["left", "right"]
+            .iter()
+            .fold(carriage.core.urdf.text.to_string(), |text, side| {
+                let child = format!("<child link=\"{side}_finger\"/>");
+                text.replace(
+                    &format!("<parent link=\"palm\"/>{child}"),
+                    &format!("<parent link=\"carriage\"/>{child}"),
+                )
+            });
     let carriage = with_urdf(carriage, carried);
     assert_eq!(
         links_of_fingers(&carriage),
@@ -718,7 +725,9 @@ fn coupled_links_of_a_mujoco_hand_belong_to_its_fingers() {
     std::fs::write(folder.path().join("hand.xml"), text).expect("it can be written");
     std::fs::write(folder.path().join("hand.toml"), profile).expect("it can be written");
     let read = actcheck_config::robot::read(&Files::Disk, &folder.path().join("hand.toml"))
-        .expect("it is valid");
+        .expect("it is valid")
+        .complete()
+        .expect("it states all roles");
     assert_eq!(
         links_of_fingers(&read),
         [["left_lower", "left_upper"], ["right_lower", "right_upper"]]

@@ -62,14 +62,19 @@ mod tests {
 
     /// The shipped robot with a forearm of many pieces.
     fn with_pieces() -> World {
-        let profile = bodies(&lonely()).robot.profile.as_ref().clone();
+        let mut profile = bodies(&lonely()).robot.profile.as_ref().clone();
         let link = "<link name=\"wrist_flex_link\">";
-        assert!(profile.urdf.text.contains(link));
+        assert!(profile.core.urdf.text.contains(link));
         let piece =
             "<collision><geometry><box size=\"0.02 0.02 0.02\"/></geometry></collision>".repeat(4);
-        let text = profile.urdf.text.replace(link, &format!("{link}{piece}"));
+        let text = profile
+            .core
+            .urdf
+            .text
+            .replace(link, &format!("{link}{piece}"));
         let urdf = actcheck_base::Source::new("pieces.urdf", text);
-        alone(actcheck_config::robot::with_urdf(profile, urdf).expect("it is a URDF"))
+        profile.core = actcheck_config::robot::with_urdf(profile.core, urdf).expect("it is a URDF");
+        alone(profile)
     }
 
     /// Returns the names of the links whose shapes are in the search.

@@ -256,12 +256,14 @@ mod tests {
             );
             let palm = "<link name=\"palm\"><collision><geometry><sphere radius=\"0.01\"/></geometry></collision>";
             let text = profile
+                .core
                 .urdf
                 .text
                 .replace("<link name=\"base\"/>", &block)
                 .replace("<link name=\"palm\">", palm);
-            profile = actcheck_config::robot::with_urdf(profile, Source::new("hand.urdf", text))
-                .expect("it is a URDF");
+            let urdf = Source::new("hand.urdf", text);
+            profile.core =
+                actcheck_config::robot::with_urdf(profile.core, urdf).expect("it is a URDF");
             let mut world = alone(profile);
             let links = bodies(&world).robot.model.links.iter();
             let names: Vec<&str> = links.map(|link| link.name.as_str()).collect();

@@ -424,7 +424,9 @@ pub(super) mod tests {
         let path = Path::new("models/robots/mobile_manipulator.toml");
         alone(
             actcheck_config::robot::read(&Files::Shipped, path)
-                .expect("the shipped robot is valid"),
+                .expect("the shipped robot is valid")
+                .complete()
+                .expect("it states all roles"),
         )
     }
 
@@ -575,9 +577,10 @@ pub(super) mod tests {
     #[test]
     fn joints_with_strong_friction_keep_up_with_their_targets() {
         let with_friction = |damping: f64| {
-            let profile = bodies(&lonely()).robot.profile.as_ref().clone();
+            let mut profile = bodies(&lonely()).robot.profile.as_ref().clone();
             let limit = r#"effort="50" velocity="1.5"/>"#;
             let (before, after) = profile
+                .core
                 .urdf
                 .text
                 .split_once(limit)
@@ -585,7 +588,9 @@ pub(super) mod tests {
             let after = after.replacen(r#"damping="0.5""#, &format!("damping=\"{damping}\""), 1);
             let text = format!("{before}{limit}{after}");
             let urdf = actcheck_base::Source::new("slow.urdf", text);
-            alone(actcheck_config::robot::with_urdf(profile, urdf).expect("it is a URDF"))
+            profile.core =
+                actcheck_config::robot::with_urdf(profile.core, urdf).expect("it is a URDF");
+            alone(profile)
         };
         let find = |world: &World| {
             let joints = world.kinematics().joints();
@@ -647,7 +652,7 @@ pub(super) mod tests {
             (refused.code, refused.help.as_deref()),
             ("W021", Some("did you mean `arm_flex_joint`?"))
         );
-        profile.tree = Arc::default();
+        profile.core.tree = Arc::default();
         assert_eq!(
             checked(&profile)
                 .expect_err("it has no links")

@@ -22,11 +22,21 @@ use std::collections::BTreeMap;
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
-use std::sync::{Mutex, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
+
+use actcheck::config::Campaign;
+use actcheck::data::RobotProfile;
+use actcheck::world;
 
 /// The checkout's root.
 pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The complete robot of a campaign; its model has no meshes.
+pub fn robot_of(campaign: &Campaign) -> Arc<RobotProfile> {
+    let completed = world::complete(&campaign.robot).unwrap();
+    Arc::new(completed.profile)
 }
 
 /// Runs the built program in a folder.

@@ -16,8 +16,10 @@ const LEAST: ArmClearance = ArmClearance {
 
 fn arm() -> (Kinematics, Layout, Vec<f64>) {
     let path = Path::new("models/robots/fixed_arm.toml");
-    let profile =
-        actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid");
+    let profile = actcheck_config::robot::read(&Files::Shipped, path)
+        .expect("the shipped robot is valid")
+        .complete()
+        .expect("it states all roles");
     let start = RobotStart {
         profile: Arc::new(profile),
         base: [0.0; 3],

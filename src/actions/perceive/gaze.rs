@@ -164,7 +164,9 @@ mod tests {
     fn the_head_can_look_ahead_from_any_posture() {
         let path = Path::new("models/robots/mobile_manipulator.toml");
         let profile = actcheck_config::robot::read(&Files::Shipped, path)
-            .expect("the shipped robot is valid");
+            .expect("the shipped robot is valid")
+            .complete()
+            .expect("it states all roles");
         let start = RobotStart {
             profile: Arc::new(profile),
             base: [0.0; 3],

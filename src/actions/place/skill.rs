@@ -122,7 +122,7 @@ fn still_in_hand(held: &Held, robot: &mut Operator<'_>) -> Result<(), Halt> {
     if !robot.felt_slip() {
         return Ok(());
     }
-    let lost = match &robot.profile().suction {
+    let lost = match &robot.profile().hand.suction {
         Some(suction) => cup::broken(robot, suction, &held.id),
         None => format!("{} slipped out of the hand on the way", held.id),
     };
@@ -211,7 +211,7 @@ fn choose(
     around.push(furniture(surface, &survey.plane));
     // Obstacles that the drive saw on the floor.
     around.extend(memory::obstacles(&robot.memory().floor));
-    let ways = spot::ways(held, &spots, robot.profile().max_opening_m);
+    let ways = spot::ways(held, &spots, robot.profile().hand.max_opening_m);
     // An arm that can't unfold straight moves around obstacles; the held object may tilt meanwhile.
     let wanted = PlanRequest {
         grasps: &ways,
@@ -251,7 +251,7 @@ fn set_down(
     let stands = lower(plan, robot)?;
     still_in_hand(held, robot)?;
     robot.begin("open");
-    let opening_m = (held.opening_m + spot::RELEASE_M).min(robot.profile().max_opening_m);
+    let opening_m = (held.opening_m + spot::RELEASE_M).min(robot.profile().hand.max_opening_m);
     robot.hold(None);
     robot.set_opening(opening_m);
     robot.wait(OPEN_SECS)?;

@@ -221,7 +221,9 @@ mod tests {
     fn the_hand_comes_close_without_tilting_its_load() {
         let path = Path::new("models/robots/fixed_arm.toml");
         let profile = actcheck_config::robot::read(&Files::Shipped, path)
-            .expect("the shipped robot is valid");
+            .expect("the shipped robot is valid")
+            .complete()
+            .expect("it states all roles");
         let start = RobotStart {
             profile: Arc::new(profile),
             base: [0.0; 3],

@@ -2,7 +2,7 @@
 
 use actcheck_actions::{Accident, Defect, Moment, Sabotage};
 use actcheck_config::Step;
-use actcheck_data::RobotProfile;
+use actcheck_data::RobotCore;
 
 /// A fault that properties should detect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,7 +17,7 @@ pub struct Fault {
 
 impl Fault {
     /// Whether it can occur when a robot performs a test with these actions.
-    pub fn concerns(&self, test: &[Step], robot: &RobotProfile) -> bool {
+    pub fn concerns(&self, test: &[Step], robot: &RobotCore) -> bool {
         let actions = self.sabotage.actions;
         // A hand that never picked holds nothing.
         let from = if self.sabotage.needs_load() {

@@ -77,7 +77,7 @@ pub fn try_faults(
     };
     let concerns = |scene: &Scene, fault: &Fault| {
         let test = env.campaign.tests.get(env.test_of(scene.index));
-        test.is_some_and(|test| fault.concerns(test, &env.campaign.robot))
+        test.is_some_and(|test| fault.concerns(test, &env.campaign.robot.core))
     };
     let with_fault = |(scene, fault): &(&Scene, &Fault)| {
         let made = if going() && concerns(scene, fault) {

@@ -1,4 +1,4 @@
-//! Finds the gripper of a profile; measures its opening on the model unless that is known.
+//! Finds the gripper of a robot; measures its opening on the model unless that is known.
 
 use std::f64::consts::{PI, TAU};
 
@@ -12,7 +12,7 @@ use crate::gripper::opening::{Gripper, Leader};
 use crate::gripper::sliding::sliding;
 use crate::gripper::table::{Entry, longest_run, travel};
 use crate::{GripperFault, RobotError};
-use actcheck_data::RobotProfile;
+use actcheck_data::Hand;
 
 /// Intervals of the table. At this number, the error between entries is about 0.01 mm for a finger
 /// of 10 cm.
@@ -25,56 +25,63 @@ const LEAST_TRAVEL_M: f64 = 0.005;
 const LEAST_LEVER_M: f64 = 1e-4;
 
 impl Gripper {
-    /// Finds the gripper of a profile. `links` are the fingers, `grasp` is the grasp frame with its
+    /// Finds the gripper of a hand. `links` are the fingers, `grasp` is the grasp frame with its
     /// link.
     ///
     /// # Errors
     /// [`RobotError::Gripper`] if the opening can't be measured, [`RobotError::Missing`] for an
     /// unknown joint.
-    pub(crate) fn find(
-        profile: &RobotProfile,
+    pub(crate) fn of(
+        hand: &Hand,
         model: &RobotModel,
         links: [usize; 2],
         grasp: (usize, Isometry3<f64>),
     ) -> Result<Self, RobotError> {
-        Self::find_with(profile, model, links, grasp, INTERVALS)
+        if let Some(cup) = &hand.suction {
+            return Ok(Self::cup(2.0 * cup.radius_m));
+        }
+        let named = hand.finger_joints.iter().map(|name| model.joint(name));
+        let named = named.collect::<Result<Vec<_>, _>>()?;
+        Self::find(&named, model, links, grasp)
+    }
+
+    /// Finds the gripper with these motors.
+    ///
+    /// # Errors
+    /// [`RobotError::Gripper`] if the opening can't be measured.
+    pub(crate) fn find(
+        named: &[usize],
+        model: &RobotModel,
+        links: [usize; 2],
+        grasp: (usize, Isometry3<f64>),
+    ) -> Result<Self, RobotError> {
+        Self::find_with(named, model, links, grasp, INTERVALS)
     }
 
     /// As [`Gripper::find`], with a coarse table: to compare candidates.
     pub(crate) fn find_coarse(
-        profile: &RobotProfile,
+        named: &[usize],
         model: &RobotModel,
         links: [usize; 2],
         grasp: (usize, Isometry3<f64>),
     ) -> Result<Self, RobotError> {
-        Self::find_with(profile, model, links, grasp, FEW_INTERVALS)
+        Self::find_with(named, model, links, grasp, FEW_INTERVALS)
     }
 
     fn find_with(
-        profile: &RobotProfile,
+        named: &[usize],
         model: &RobotModel,
         links: [usize; 2],
         grasp: (usize, Isometry3<f64>),
         n_intervals: usize,
     ) -> Result<Self, RobotError> {
-        if let Some(cup) = &profile.suction {
-            return Ok(Self::cup(2.0 * cup.radius_m));
-        }
-        let named = profile
-            .finger_joints
-            .iter()
-            .map(|name| model.joint(name))
-            .collect::<Result<Vec<_>, _>>()?;
         let [left, right] = links;
         // Some robots name their fingers as seen from the front.
         let probes = [[left, right], [right, left]].map(|links| Probe::new(model, links, grasp));
-        if let Some(sliding) = probes
-            .iter()
-            .find_map(|probe| sliding(&named, model, probe))
-        {
+        if let Some(sliding) = probes.iter().find_map(|probe| sliding(named, model, probe)) {
             return Ok(sliding);
         }
-        let [usual, swapped] = probes.map(|probe| measured(&named, model, &probe, n_intervals));
+        let [usual, swapped] = probes.map(|probe| measured(named, model, &probe, n_intervals));
         let found = match (usual, swapped) {
             (Ok(usual), Ok(swapped)) if swapped.widest_m > usual.widest_m => {
                 Ok(swapped.with_sides_swapped())
@@ -83,7 +90,7 @@ impl Gripper {
             (usual, _) => usual,
         };
         found.map_err(|fault| RobotError::Gripper {
-            name: profile.urdf.name.to_string(),
+            name: model.name.clone(),
             fault,
         })
     }

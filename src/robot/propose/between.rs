@@ -7,7 +7,6 @@ use super::seat;
 use crate::Gripper;
 use crate::description::RobotModel;
 use crate::gripper::pushes;
-use actcheck_data::RobotProfile;
 
 /// Opening at which a single moving finger is centred. Unit: metres. The width of a can.
 pub(super) const CENTRED_AT_M: f64 = 0.06;
@@ -27,7 +26,6 @@ const LEAST_SHARE: f64 = 0.8;
 
 /// Two fingers of a hand. Frames are in the frame of the palm.
 pub(super) struct Between<'a> {
-    pub(super) bare: &'a RobotProfile,
     pub(super) model: &'a RobotModel,
     pub(super) palm: usize,
     pub(super) links: [usize; 2],
@@ -38,8 +36,7 @@ pub(super) struct Between<'a> {
 impl Between<'_> {
     /// The gripper with this grasp frame.
     pub(super) fn gripper(&self, frame: Isometry3<f64>) -> Option<Gripper> {
-        let profile = driven(self.bare, self.model, self.named);
-        Gripper::find(&profile, self.model, self.links, (self.palm, frame)).ok()
+        Gripper::find(self.named, self.model, self.links, (self.palm, frame)).ok()
     }
 
     /// A frame between a jaw and a fixed one, turned until both push an object equally, if it is
@@ -105,17 +102,5 @@ impl Between<'_> {
     fn is_wide(&self, moved: Isometry3<f64>, now: &Gripper) -> bool {
         self.gripper(moved)
             .is_some_and(|gripper| gripper.widest_m() > LEAST_SHARE * now.widest_m())
-    }
-}
-
-/// The profile with these joints as those of its fingers.
-pub(super) fn driven(bare: &RobotProfile, model: &RobotModel, named: &[usize]) -> RobotProfile {
-    let finger_joints = named
-        .iter()
-        .map(|idx| model.joints[*idx].name.clone())
-        .collect();
-    RobotProfile {
-        finger_joints,
-        ..bare.clone()
     }
 }

@@ -6,6 +6,7 @@ use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 
 use crate::description::{Joint, JointKind, RobotModel};
 use crate::kinematics::motion;
+use actcheck_data::LinkFrame;
 
 /// Words in the names of cameras, the best first.
 const CAMERA_WORDS: [&str; 9] = [
@@ -50,8 +51,7 @@ pub(super) struct Body {
     pub(super) lowest_m: f64,
     /// Whether it is fixed, without a pedestal of its own.
     pub(super) is_table_top: bool,
-    pub camera_link: String,
-    pub(super) camera_turned_rad: [f64; 3],
+    pub(super) camera: LinkFrame,
 }
 
 /// Finds the body of the hand at `palm`. `others` are the names of links that carry other hands.
@@ -98,14 +98,14 @@ pub(super) fn find(
             model.links[palm].name
         ),
     );
-    let (camera_link, camera, camera_turned_rad) = camera(model, palm, notes);
+    let (camera, camera_at) = camera(model, palm, notes);
     let others: Vec<usize> = arm
         .iter()
         .copied()
         .chain(own_base.into_iter().flatten())
         .chain(torso)
         .collect();
-    let head = head(model, camera, &others);
+    let head = head(model, camera_at, &others);
     let lowest_m = lowest(model);
     let shoulder_m = arm
         .first()
@@ -138,8 +138,7 @@ pub(super) fn find(
         mount_height_m,
         lowest_m,
         is_table_top,
-        camera_link,
-        camera_turned_rad,
+        camera,
     }
 }
 
@@ -227,13 +226,13 @@ fn lowest(model: &RobotModel) -> f64 {
     corners.fold(0.0, f64::min)
 }
 
-/// Chooses a camera by its name and place: on a head rather than on a base or hand. Returns the
-/// link, the merged link and the rotation of the lens.
+/// Chooses a camera by its name and place: on a head rather than on a base or hand. Returns its
+/// frame and the merged link.
 fn camera(
     model: &RobotModel,
     palm: usize,
     notes: &mut BTreeMap<&'static str, String>,
-) -> (String, usize, [f64; 3]) {
+) -> (LinkFrame, usize) {
     let poses = poses_at_zero(model);
     let on_hand = |link: usize| {
         let above = chain(model, link);
@@ -261,7 +260,7 @@ fn camera(
     let rated = model
         .frames()
         .filter_map(|(name, (link, at))| rate(name, *link, at));
-    match rated.max_by(|a, b| a.0.cmp(&b.0).then(b.1.cmp(&a.1))) {
+    let (link, at, turned_rad) = match rated.max_by(|a, b| a.0.cmp(&b.0).then(b.1.cmp(&a.1))) {
         Some((_, name, link, turned)) => {
             notes.insert("camera_link", "its name".to_owned());
             (name, link, turned)
@@ -274,7 +273,13 @@ fn camera(
             );
             (root, 0, [0.0; 3])
         }
-    }
+    };
+    let frame = LinkFrame {
+        link,
+        offset_m: [0.0; 3],
+        turned_rad,
+    };
+    (frame, at)
 }
 
 /// Returns the rotation of a camera in a frame: along its x or its z axis, whichever is level or

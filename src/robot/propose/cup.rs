@@ -6,10 +6,10 @@ use std::f64::consts::PI;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::body::chain;
-use super::fingers::{ProposedHand, is_called, rounded};
+use super::fingers::{ProposedHand, is_called, rounded, written};
 use super::frames::corners;
 use crate::description::RobotModel;
-use actcheck_data::{RobotProfile, Suction};
+use actcheck_data::{Hand, Suction};
 
 /// Words in the names of links with a cup.
 const WORDS: [&str; 2] = ["suction", "vacuum"];
@@ -26,11 +26,7 @@ const RADII_M: (f64, f64) = (0.003, 0.1);
 
 /// Finds a link with the name of a cup, and proposes its lip as the grasp frame. Returns `None` if
 /// there is none.
-pub(super) fn find(
-    partial: &RobotProfile,
-    model: &RobotModel,
-    wanted: Option<&str>,
-) -> Option<ProposedHand> {
+pub(super) fn find(model: &RobotModel, wanted: Option<&str>) -> Option<ProposedHand> {
     let has_word = |name: &str| WORDS.iter().any(|word| name.to_lowercase().contains(word));
     let is_wanted = |link: usize| wanted.is_none_or(|wanted| is_called(model, link, wanted));
     let named = model
@@ -63,20 +59,12 @@ pub(super) fn find(
     let turned = UnitQuaternion::rotation_between(&Vector3::x(), &axis)
         .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), PI));
     let frame = Isometry3::from_parts(Translation3::from(axis * reach_m), turned);
-    let (roll, pitch, yaw) = frame.rotation.euler_angles();
     let force_n = (PRESSURE_PA * PI * radius_m * radius_m).round();
     let cup = Suction {
         force_n,
         radius_m: rounded([radius_m; 3])[0],
         friction: FRICTION,
     };
-    let profile = RobotProfile {
-        grasp_offset_m: rounded(frame.translation.vector.into()),
-        grasp_turned_rad: rounded([roll, pitch, yaw]),
-        grasp_link: name,
-        ..partial.clone()
-    };
-    let profile = profile.with_cup(cup);
     let notes = BTreeMap::from([
         ("grasp_link", "its name is that of a suction cup".to_owned()),
         ("grasp_offset_m", "the end of its shapes".to_owned()),
@@ -90,12 +78,10 @@ pub(super) fn find(
             "the area of the lip at 0.6 bar below the air's pressure".to_owned(),
         ),
     ]);
+    let hand = Hand::of_cup(written(name, &frame), cup);
     Some(ProposedHand {
-        profile,
-        palm: *palm,
         notes,
-        others: Vec::new(),
-        score: 0.0,
+        ..ProposedHand::known(hand, *palm)
     })
 }
 

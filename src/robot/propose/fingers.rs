@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-use super::between::{Between, CENTRED_AT_M, driven};
+use super::between::{Between, CENTRED_AT_M};
 use super::body::chain;
 use super::cup;
 use super::effort::Effort;
@@ -16,8 +16,9 @@ use super::stated::{NoHand, Stated};
 use super::weights::{innermost, powered, tips};
 use crate::description::{JointKind, RobotModel};
 use crate::gripper::Probe;
-use crate::{Gripper, GripperFault};
-use actcheck_data::RobotProfile;
+use crate::layout::frame;
+use crate::{Gripper, GripperFault, RobotError};
+use actcheck_data::{FINGER_FRICTION, GRIP_FORCE_N, Hand, LinkFrame, StatedFingers, StatedHand};
 
 /// Most pairs of fingers that are measured.
 const MOST_PAIRS: usize = 40;
@@ -34,9 +35,9 @@ const GAPS_OF_RATING: u64 = 140;
 /// Openings wider than this are worth no more. Unit: metres.
 const WIDE_M: f64 = 0.12;
 
-/// A gripper, as a profile without other roles.
+/// A gripper that was found.
 pub(super) struct ProposedHand {
-    pub(super) profile: RobotProfile,
+    pub(super) hand: Hand,
     /// The link that carries the fingers.
     pub(super) palm: usize,
     pub(super) notes: BTreeMap<&'static str, String>,
@@ -44,6 +45,22 @@ pub(super) struct ProposedHand {
     pub(super) others: Vec<String>,
     /// How good it is, to compare hands of the same robot; 0 if the profile names its parts.
     pub(super) score: f64,
+    /// The joint of a thumb that is parked opposite the fingers, with its position.
+    pub(super) thumb: Option<(String, f64)>,
+}
+
+impl ProposedHand {
+    /// A hand that was not searched for.
+    pub(super) fn known(hand: Hand, palm: usize) -> Self {
+        Self {
+            hand,
+            palm,
+            notes: BTreeMap::new(),
+            others: Vec::new(),
+            score: 0.0,
+            thumb: None,
+        }
+    }
 }
 
 /// Finds the best gripper, and keeps the parts that the profile names. Of several hands, only those
@@ -53,43 +70,29 @@ pub(super) struct ProposedHand {
 /// # Errors
 /// [`NoHand`] if there is none.
 pub(super) fn find(
-    partial: &RobotProfile,
+    hand: &StatedHand,
     model: &RobotModel,
     wanted: Option<&str>,
     effort: &mut Effort,
 ) -> Result<ProposedHand, NoHand> {
-    let stated = Stated::of(partial, model)?;
-    if let (Some(_), Some((palm, _))) = (partial.suction, stated.grasp) {
-        return Ok(ProposedHand {
-            profile: partial.clone(),
-            palm,
-            notes: BTreeMap::new(),
-            others: Vec::new(),
-            score: 0.0,
-        });
-    }
-    if let (Some(links), [_, ..], Some(grasp)) =
-        (stated.links, stated.joints.as_slice(), stated.grasp)
-    {
-        let mut profile = partial.clone();
-        if profile.max_opening_m == 0.0 {
-            profile.max_opening_m =
-                as_opening(Gripper::find(partial, model, links, grasp)?.widest_m());
+    let fingers = match hand {
+        StatedHand::Fingers(fingers) => fingers,
+        StatedHand::Cup { grasp, cup } => {
+            let (palm, _) = frame(model, grasp)?;
+            return Ok(ProposedHand::known(Hand::of_cup(grasp.clone(), *cup), palm));
         }
-        return Ok(ProposedHand {
-            profile,
-            palm: grasp.0,
-            notes: BTreeMap::new(),
-            others: Vec::new(),
-            score: 0.0,
-        });
+    };
+    let stated = Stated::of(fingers, model)?;
+    let with_opening = with_opening(fingers, &stated, model)?;
+    if let (Ok(hand), Some((palm, _))) = (with_opening.complete(), stated.grasp) {
+        return Ok(ProposedHand::known(hand, palm));
     }
     let groups = stated.groups(model).unwrap_or_else(|| groups(model));
     if groups.is_empty() {
-        if let Some(hand) = cup::find(partial, model, wanted) {
+        if let Some(hand) = cup::find(model, wanted) {
             return Ok(hand);
         }
-        if let (Some(wanted), Some(other)) = (wanted, cup::find(partial, model, None)) {
+        if let (Some(wanted), Some(other)) = (wanted, cup::find(model, None)) {
             let there = &model.links[other.palm].name;
             return Err(NoHand::Gripper(GripperFault::UnknownHand {
                 wanted: wanted.to_owned(),
@@ -122,25 +125,16 @@ pub(super) fn find(
     }
     rated.retain(|(_, palm, _)| stated.grasp.is_none_or(|(link, _)| link == *palm));
     rated.sort_by_key(|(rank, palm, _)| (std::cmp::Reverse(*rank), *palm));
-    // The meshes are in the model already.
-    let light = RobotProfile {
-        meshes: BTreeMap::new(),
-        ..partial.clone()
-    };
     let mut best = None;
     for (place, (_, palm, joints)) in rated.iter().enumerate() {
         let mut part = effort.part(rated.len() - place);
-        best = measure(&light, model, &stated, (*palm, joints), &mut part);
+        best = measure((fingers, &stated), model, (*palm, joints), &mut part);
         effort.join(&part);
         if best.is_some() {
             break;
         }
     }
     let best = best.map(|hand| ProposedHand {
-        profile: RobotProfile {
-            meshes: partial.meshes.clone(),
-            ..hand.profile
-        },
         others: others_than(model, &groups, hand.palm),
         ..hand
     });
@@ -149,6 +143,29 @@ pub(super) fn find(
             GripperFault::NoOpposition if effort.is_cut() => GripperFault::CutShort,
             fault => fault,
         })
+    })
+}
+
+/// The fingers with their opening, which is measured if a profile states all but that.
+fn with_opening(
+    fingers: &StatedFingers,
+    stated: &Stated,
+    model: &RobotModel,
+) -> Result<StatedFingers, RobotError> {
+    let (Some(links), Some(joints), Some(grasp), None) = (
+        stated.links,
+        &fingers.finger_joints,
+        stated.grasp,
+        fingers.max_opening_m,
+    ) else {
+        return Ok(fingers.clone());
+    };
+    let named = joints.iter().map(|name| model.joint(name));
+    let named = named.collect::<Result<Vec<_>, _>>()?;
+    let widest_m = Gripper::find(&named, model, links, grasp)?.widest_m();
+    Ok(StatedFingers {
+        max_opening_m: Some(as_opening(widest_m)),
+        ..fingers.clone()
     })
 }
 
@@ -251,7 +268,6 @@ impl HandCandidate {
 /// measured with its first joints before any with its second ones, so that a cut search has seen
 /// all fingers.
 fn best_candidate(
-    bare: &RobotProfile,
     model: &RobotModel,
     stated: &Stated,
     (palm, joints): (usize, &BTreeSet<usize>),
@@ -280,7 +296,7 @@ fn best_candidate(
                 return best;
             }
             effort.spend(GAPS_OF_RATING * steps_of_gap);
-            let Some(found) = rate(bare, model, palm, links, named, frame) else {
+            let Some(found) = rate(model, palm, links, named, frame) else {
                 continue;
             };
             let weight = weight * powered(model, named, joints) * tips(model, links, joints);
@@ -296,7 +312,6 @@ fn best_candidate(
                 continue;
             }
             let between = Between {
-                bare,
                 model,
                 palm,
                 links,
@@ -313,16 +328,14 @@ fn best_candidate(
 }
 
 fn measure(
-    bare: &RobotProfile,
+    (fingers, stated): (&StatedFingers, &Stated),
     model: &RobotModel,
-    stated: &Stated,
     (palm, joints): (usize, &BTreeSet<usize>),
     effort: &mut Effort,
 ) -> Option<ProposedHand> {
-    let mut found = best_candidate(bare, model, stated, (palm, joints), effort)?;
+    let mut found = best_candidate(model, stated, (palm, joints), effort)?;
     let mut deeper = false;
     let between = Between {
-        bare,
         model,
         palm,
         links: found.links,
@@ -342,9 +355,12 @@ fn measure(
     if let Some(gripper) = between.gripper(found.frame) {
         found.widest_m = gripper.widest_m();
     }
-    let mut profile = bare.clone();
     let mut notes = BTreeMap::new();
-    if stated.joints.is_empty() {
+    let finger_joints = fingers.finger_joints.clone().unwrap_or_else(|| {
+        notes.insert(
+            "finger_joints",
+            "their names, and the links that they move".to_owned(),
+        );
         let named = alike(model, found.links).unwrap_or_else(|| {
             [
                 found.named.clone(),
@@ -353,27 +369,17 @@ fn measure(
             .concat()
         });
         let own = |idx: &usize| model.own_leaders.get(idx).copied().unwrap_or(*idx);
-        profile.finger_joints = named
-            .iter()
-            .map(|idx| model.joints[own(idx)].name.clone())
-            .collect();
-        notes.insert(
-            "finger_joints",
-            "their names, and the links that they move".to_owned(),
-        );
-    }
-    if stated.links.is_none() {
-        profile.finger_links = found.links.map(|link| model.links[link].name.clone());
+        let names = named.iter().map(|idx| model.joints[own(idx)].name.clone());
+        names.collect()
+    });
+    let finger_links = fingers.finger_links.clone().unwrap_or_else(|| {
         notes.insert(
             "finger_links",
             format!("these two face each other and open widest{}", cut(effort)),
         );
-    }
-    if stated.grasp.is_none() {
-        profile.grasp_link = model.links[palm].name.clone();
-        profile.grasp_offset_m = rounded(found.frame.translation.vector.into());
-        let (roll, pitch, yaw) = found.frame.rotation.euler_angles();
-        profile.grasp_turned_rad = rounded([roll, pitch, yaw]);
+        found.links.map(|link| model.links[link].name.clone())
+    });
+    let grasp = fingers.grasp.clone().unwrap_or_else(|| {
         let place = match deeper {
             true => "between the fingers, where they don't squeeze a can out",
             false => "between the fingertips, 2.5 cm before their ends",
@@ -383,18 +389,36 @@ fn measure(
             "grasp_turned_rad",
             "x along the fingers, y from the right to the left one".to_owned(),
         );
-    }
-    if profile.max_opening_m == 0.0 {
-        profile.max_opening_m = as_opening(found.widest_m);
+        written(model.links[palm].name.clone(), &found.frame)
+    });
+    let max_opening_m = fingers.max_opening_m.unwrap_or_else(|| {
         notes.insert("max_opening_m", "measured at that place".to_owned());
-    }
+        as_opening(found.widest_m)
+    });
+    let hand = Hand {
+        grasp,
+        finger_joints,
+        finger_links,
+        max_opening_m,
+        finger_friction: fingers.finger_friction.unwrap_or(FINGER_FRICTION),
+        grip_force_n: fingers.grip_force_n.unwrap_or(GRIP_FORCE_N),
+        suction: None,
+    };
     Some(ProposedHand {
-        profile,
-        palm,
         notes,
-        others: Vec::new(),
         score: found.score,
+        ..ProposedHand::known(hand, palm)
     })
+}
+
+/// A frame on a link, as a profile states it.
+pub(super) fn written(link: String, frame: &Isometry3<f64>) -> LinkFrame {
+    let (roll, pitch, yaw) = frame.rotation.euler_angles();
+    LinkFrame {
+        link,
+        offset_m: rounded(frame.translation.vector.into()),
+        turned_rad: rounded([roll, pitch, yaw]),
+    }
 }
 
 /// A remark about a search that was cut short.
@@ -521,15 +545,13 @@ pub(super) fn leader(model: &RobotModel, joint: usize) -> usize {
 
 /// Rates a candidate: how far its fingers open and close, and how far it is from the palm.
 fn rate(
-    bare: &RobotProfile,
     model: &RobotModel,
     palm: usize,
     links: [usize; 2],
     named: &[usize],
     frame: Isometry3<f64>,
 ) -> Option<HandCandidate> {
-    let profile = driven(bare, model, named);
-    let gripper = Gripper::find_coarse(&profile, model, links, (palm, frame)).ok()?;
+    let gripper = Gripper::find_coarse(named, model, links, (palm, frame)).ok()?;
     // Surfaces at the grasp frame must have been found for both fingers.
     let mut positions = vec![0.0; model.joints.len()];
     gripper.set(&mut positions, gripper.widest_m());
@@ -573,6 +595,16 @@ mod tests {
     const INERTIAL: &str = "<inertial><mass value=\"0.1\"/>\
         <inertia ixx=\"1e-4\" ixy=\"0\" ixz=\"0\" iyy=\"1e-4\" iyz=\"0\" izz=\"1e-4\"/></inertial>";
 
+    /// A hand of which nothing is stated.
+    const UNKNOWN: StatedHand = StatedHand::Fingers(StatedFingers {
+        grasp: None,
+        finger_joints: None,
+        finger_links: None,
+        max_opening_m: None,
+        finger_friction: None,
+        grip_force_n: None,
+    });
+
     /// A finger that slides by 4 cm along y, with its shape ahead of its joint along x, and the
     /// share by which it follows the joint `finger_pad_left`.
     fn finger(name: &str, [x, y]: [f64; 2], ahead_m: f64, share: f64) -> String {
@@ -595,20 +627,19 @@ mod tests {
     }
 
     /// The hand that is found on a palm with these fingers.
-    fn found(fingers: &[String]) -> RobotProfile {
+    fn found(fingers: &[String]) -> Hand {
         found_on("", fingers)
     }
 
     /// The hand that is found on a palm with these shapes and fingers.
-    fn found_on(shapes: &str, fingers: &[String]) -> RobotProfile {
-        let (profile, model) = hand(shapes, fingers);
-        find(&profile, &model, None, &mut Effort::whole())
+    fn found_on(shapes: &str, fingers: &[String]) -> Hand {
+        find(&UNKNOWN, &hand(shapes, fingers), None, &mut Effort::whole())
             .unwrap_or_else(|_| panic!("there is a hand"))
-            .profile
+            .hand
     }
 
-    /// A profile without roles of a palm with these shapes and fingers.
-    fn hand(shapes: &str, fingers: &[String]) -> (RobotProfile, RobotModel) {
+    /// A palm with these shapes and fingers.
+    fn hand(shapes: &str, fingers: &[String]) -> RobotModel {
         let path = Path::new("models/robots/fixed_arm.toml");
         let shipped = actcheck_config::robot::read(&Files::Shipped, path)
             .expect("the shipped robot is valid");
@@ -616,25 +647,16 @@ mod tests {
             "<robot name=\"hand\"><link name=\"palm\">{INERTIAL}{shapes}</link>{}</robot>",
             fingers.concat()
         );
-        let profile = RobotProfile {
-            arm_joints: Vec::new(),
-            finger_joints: Vec::new(),
-            finger_links: [String::new(), String::new()],
-            grasp_link: String::new(),
-            max_opening_m: 0.0,
-            ..shipped
-        };
-        let profile = actcheck_config::robot::with_urdf(profile, Source::new("hand.urdf", text))
+        let core = actcheck_config::robot::with_urdf(shipped.core, Source::new("hand.urdf", text))
             .expect("it is a URDF");
-        let model = RobotModel::read(&profile).expect("the hand is valid");
-        (profile, model)
+        RobotModel::without_roles(&core).expect("the hand is valid")
     }
 
     /// A search that is cut short proposes the best of the measured candidates with a remark, and the
     /// same each time; one that measured none says so.
     #[test]
     fn a_search_without_steps_left_proposes_the_best_so_far() {
-        let (profile, model) = hand(
+        let model = hand(
             "",
             &[
                 finger("finger_bar_left", [0.0, 0.04], 0.06, 1.0),
@@ -643,7 +665,7 @@ mod tests {
                 finger("finger_pad_right", [0.0, -0.006], 0.06, -1.0),
             ],
         );
-        let with = |steps: u64| find(&profile, &model, None, &mut Effort::of(steps));
+        let with = |steps: u64| find(&UNKNOWN, &model, None, &mut Effort::of(steps));
         let fault = match with(0) {
             Err(NoHand::Gripper(fault)) => fault,
             _ => panic!("nothing was measured"),
@@ -658,8 +680,8 @@ mod tests {
         let (steps, first) = &found[0];
         assert!(is_cut(first), "{steps}");
         assert_eq!(
-            with(*steps).ok().map(|hand| hand.profile),
-            Some(first.profile.clone())
+            with(*steps).ok().map(|hand| hand.hand),
+            Some(first.hand.clone())
         );
         let (_, last) = &found[found.len() - 1];
         assert!(!is_cut(last) && last.score >= first.score);
@@ -696,14 +718,14 @@ mod tests {
                 finger("finger_pad_right", [joint_m, -0.006], ahead_m, -1.0),
             ];
             let found = found_on(shapes, &fingers);
-            let [roll, pitch, yaw] = found.grasp_turned_rad;
+            let [roll, pitch, yaw] = found.grasp.turned_rad;
             let ahead = UnitQuaternion::from_euler_angles(roll, pitch, yaw) * Vector3::x();
             assert!(ahead.x > 0.99, "{ahead}");
-            let before_tip_m = joint_m + ahead_m + 0.05 - found.grasp_offset_m[0];
+            let before_tip_m = joint_m + ahead_m + 0.05 - found.grasp.offset_m[0];
             assert!(
                 (0.01..0.046).contains(&before_tip_m),
                 "{:?}",
-                found.grasp_offset_m
+                found.grasp.offset_m
             );
         }
     }

@@ -36,20 +36,41 @@ use crate::description::RobotModel;
 use crate::gripper::between_fingers;
 use crate::layout::{Named, frame};
 use crate::{GripperFault, RobotError};
-use actcheck_data::RobotProfile;
+use actcheck_data::{
+    Hand, LinkFrame, RobotCore, RobotProfile, RobotRoles, StatedHand, StatedRobot,
+};
 
-/// A profile with all roles assigned, but perhaps those of the hand, and the basis of its guesses.
+/// The basis of guesses, by the profile's key: lower-case sentences without a full stop.
+pub type Notes = BTreeMap<&'static str, String>;
+
+/// A robot with all roles assigned, but perhaps those of the hand, and the basis of its guesses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Proposal {
-    /// The profile.
-    pub profile: RobotProfile,
-    /// The basis of guesses, by the profile's key: lower-case sentences without a full stop.
-    pub notes: BTreeMap<&'static str, String>,
+    /// Its links and joints, and its place.
+    pub core: RobotCore,
+    /// Joints that position the hand.
+    pub arm_joints: Vec<String>,
+    /// Its gripper, or the end of the arm if no gripper was found there.
+    pub hand: Result<Hand, UnknownHand>,
+    /// The depth camera.
+    pub camera: LinkFrame,
+    /// Arm posture for driving.
+    pub home: Vec<f64>,
+    /// Seeds of inverse kinematics.
+    pub postures: Vec<Vec<f64>>,
+    /// The basis of its guesses.
+    pub notes: Notes,
     /// Links of the robot that carry other hands.
     pub other_hands: Vec<String>,
-    /// The end of the arm if no gripper was found there: the profile has no fingers and no grasp
-    /// frame then.
-    pub unknown_hand: Option<UnknownHand>,
+}
+
+/// A complete profile.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Completed {
+    /// The profile.
+    pub profile: RobotProfile,
+    /// The defaults and measurements in it, which the robot's own profile does not state.
+    pub notes: Notes,
 }
 
 /// A frame on a link, by its index: the pose of the grasp relative to the link.
@@ -67,51 +88,70 @@ const MOST_OTHER_HANDS: usize = 4;
 ///
 /// # Errors
 /// [`RobotError`] if the URDF can't be used, has no arm, or no hand with that name.
-pub fn propose(bare: &RobotProfile, hand: Option<&str>) -> Result<Proposal, RobotError> {
-    find(bare, true, hand)
-}
-
-/// Returns whether a profile leaves out roles that [`complete`] finds.
-pub fn is_incomplete(profile: &RobotProfile) -> bool {
-    let names = [
-        &profile.grasp_link,
-        &profile.camera_link,
-        &profile.finger_links[0],
-    ];
-    let missing = names.iter().any(|name| name.is_empty()) || profile.arm_joints.is_empty();
-    let no_hand = profile.suction.is_none() && profile.finger_joints.is_empty();
-    missing || no_hand || profile.max_opening_m == 0.0 || profile.home.is_empty()
-}
-
-/// Finds the roles that a profile leaves out, on a model whose meshes are convex: arm, fingers,
-/// grasp frame, opening, camera, home and postures. Without a base, the profile's robot is fixed.
-///
-/// # Errors
-/// As [`propose`], and [`RobotError`] if no gripper is found.
-pub fn complete(partial: &RobotProfile) -> Result<Proposal, RobotError> {
-    find(partial, false, None)
-}
-
-/// Finds the roles that a profile leaves out; its base, mount and head too if `all`.
-fn find(partial: &RobotProfile, all: bool, wanted: Option<&str>) -> Result<Proposal, RobotError> {
-    let name = partial.urdf.name.to_string();
+pub fn propose(core: RobotCore, hand: Option<&str>) -> Result<Proposal, RobotError> {
+    let bare = StatedRobot::bare(core);
+    let name = bare.core.urdf.name.to_string();
     let mut effort = Effort::whole();
-    let found = thumb::find(partial, wanted, &mut effort);
-    let (model, hand, unknown_hand) = match found {
-        Ok((model, hand)) => (model, hand, None),
-        Err(NoHand::Gripper(fault)) if all && leaves_a_gap(&fault) => {
-            let (model, hand, unknown) =
-                unknown_hand::find(partial, wanted, fault).map_err(|error| error.named(&name))?;
-            (model, hand, Some(unknown))
+    let (model, found, unknown) = match thumb::find(&bare, hand, &mut effort) {
+        Ok((model, found)) => (model, found, None),
+        Err(NoHand::Gripper(fault)) if leaves_a_gap(&fault) => {
+            let (model, found, unknown) =
+                unknown_hand::find(&bare, hand, fault).map_err(|error| error.named(&name))?;
+            (model, found, Some(unknown))
         }
         Err(error) => return Err(error.named(&name)),
     };
-    let mut proposal = assembled(partial, all, (&model, hand), &mut effort)?;
-    if unknown_hand.is_some() {
-        proposal.profile = unknown_hand::without_placeholder(proposal.profile, partial);
-        proposal.unknown_hand = unknown_hand;
+    let other_hands = found.others.clone();
+    let Completed { profile, notes } = assembled(&bare, true, (&model, found), &mut effort)?;
+    Ok(Proposal {
+        core: profile.core,
+        arm_joints: profile.arm_joints,
+        hand: unknown.map_or(Ok(profile.hand), Err),
+        camera: profile.camera,
+        home: profile.home,
+        postures: profile.postures,
+        notes,
+        other_hands,
+    })
+}
+
+/// Returns the complete profile of a robot whose meshes are convex. The roles that its own profile
+/// leaves out are found on the model: arm, fingers, grasp frame, opening, camera, home and
+/// postures. Without a base, the robot is fixed.
+///
+/// # Errors
+/// [`RobotError`] if the URDF can't be used, has no arm, or no gripper is found.
+pub fn complete(stated: &StatedRobot) -> Result<Completed, RobotError> {
+    let mut completed = match stated.complete() {
+        Ok(profile) => Completed {
+            profile,
+            notes: Notes::new(),
+        },
+        Err(_) => {
+            let mut effort = Effort::whole();
+            let (model, hand) = thumb::find(stated, None, &mut effort)
+                .map_err(|error| error.named(&stated.core.urdf.name))?;
+            assembled(stated, false, (&model, hand), &mut effort)?
+        }
+    };
+    if let StatedHand::Fingers(fingers) = &stated.hand {
+        let defaults = [
+            (
+                "finger_friction",
+                fingers.finger_friction,
+                "that of rubber pads",
+            ),
+            (
+                "grip_force_n",
+                fingers.grip_force_n,
+                "a usual setting of grippers",
+            ),
+        ];
+        for (key, _, note) in defaults.iter().filter(|(_, stated, _)| stated.is_none()) {
+            completed.notes.insert(key, (*note).to_owned());
+        }
     }
-    Ok(proposal)
+    Ok(completed)
 }
 
 /// Whether a profile can be proposed in spite of this fault, with a gap for the hand.
@@ -126,17 +166,69 @@ fn leaves_a_gap(fault: &GripperFault) -> bool {
     )
 }
 
-/// The proposal with this hand.
+/// A robot whose postures are not known yet.
+struct Draft {
+    core: RobotCore,
+    arm_joints: Vec<String>,
+    hand: Hand,
+    camera: LinkFrame,
+}
+
+impl Draft {
+    fn roles(&self) -> RobotRoles<'_> {
+        RobotRoles {
+            core: &self.core,
+            arm_joints: &self.arm_joints,
+            hand: &self.hand,
+            camera: &self.camera,
+        }
+    }
+
+    /// The model with its base, so that inverse kinematics moves it too, and the frame of its
+    /// grasp.
+    fn with_grasp(&self) -> Result<(Arc<RobotModel>, GraspFrame), RobotError> {
+        let model = Arc::new(RobotModel::read(self.roles())?);
+        let grasp = frame(&model, &self.hand.grasp)?;
+        Ok((model, grasp))
+    }
+
+    fn with_postures(self, home: Vec<f64>, postures: Vec<Vec<f64>>) -> RobotProfile {
+        RobotProfile {
+            core: self.core,
+            arm_joints: self.arm_joints,
+            hand: self.hand,
+            camera: self.camera,
+            home,
+            postures,
+        }
+    }
+}
+
+/// The complete profile with this hand; its base, mount and head are found too if `all`.
 fn assembled(
-    partial: &RobotProfile,
+    partial: &StatedRobot,
     all: bool,
-    (model, hand): (&RobotModel, ProposedHand),
+    (model, found): (&RobotModel, ProposedHand),
     effort: &mut Effort,
-) -> Result<Proposal, RobotError> {
-    let name = partial.urdf.name.to_string();
-    let mut notes = hand.notes;
-    let mut profile = hand.profile;
-    let body = body::find(model, hand.palm, &hand.others, &mut notes);
+) -> Result<Completed, RobotError> {
+    let ProposedHand {
+        hand,
+        palm,
+        mut notes,
+        others,
+        thumb,
+        ..
+    } = found;
+    let mut core = partial.core.clone();
+    core.parked.extend(thumb);
+    let mut of_body = Notes::new();
+    let body = body::find(model, palm, &others, &mut of_body);
+    of_body.retain(|key, _| match *key {
+        "arm_joints" => partial.arm_joints.is_none(),
+        "camera_link" => partial.camera.is_none(),
+        _ => all,
+    });
+    notes.extend(of_body);
     let joint_names = |joints: &[usize]| {
         joints
             .iter()
@@ -144,40 +236,41 @@ fn assembled(
             .collect::<Vec<_>>()
     };
     if all {
-        profile.head_joints = joint_names(&body.head);
-        profile.mount_height_m = body.mount_height_m;
+        core.head_joints = joint_names(&body.head);
+        core.mount_height_m = body.mount_height_m;
         let own_base = body
             .own_base
             .map(|joints| joints.map(|idx| model.joints[idx].name.clone()));
-        profile.planar_base = body.drives && own_base.is_none();
-        profile.base_joints = match profile.planar_base {
-            true => Some(RobotProfile::PLANAR_JOINTS.map(str::to_owned)),
+        core.planar_base = body.drives && own_base.is_none();
+        core.base_joints = match core.planar_base {
+            true => Some(RobotCore::PLANAR_JOINTS.map(str::to_owned)),
             false => own_base,
         };
     }
-    if profile.arm_joints.is_empty() {
-        profile.arm_joints = joint_names(&body.arm);
-        profile.arm_joints.retain(|joint| {
-            !profile
-                .base_joints
-                .iter()
-                .flatten()
-                .any(|of_base| of_base == joint)
-        });
-    }
-    if profile.arm_joints.is_empty() {
+    let is_of_base = |joint: &String| core.base_joints.iter().flatten().any(|own| own == joint);
+    let arm_joints = partial.arm_joints.clone().unwrap_or_else(|| {
+        let mut found = joint_names(&body.arm);
+        found.retain(|joint| !is_of_base(joint));
+        found
+    });
+    if arm_joints.is_empty() {
+        let name = core.urdf.name.to_string();
         return Err(RobotError::Armless { name });
     }
-    if profile.camera_link.is_empty() {
-        (profile.camera_link, profile.camera_turned_rad) =
-            (body.camera_link, body.camera_turned_rad);
-    }
-    let (mut model, grasp) = with_grasp(&profile)?;
-    let fingers = profile
+    let camera = partial.camera.clone().unwrap_or(body.camera);
+    let mut draft = Draft {
+        core,
+        arm_joints,
+        hand,
+        camera,
+    };
+    let (mut model, grasp) = draft.with_grasp()?;
+    let fingers = draft
+        .hand
         .finger_links
         .clone()
         .map(|name| model.frame(&name).map_or(grasp.0, |(link, _)| link));
-    let markers = if all && profile.suction.is_none() {
+    let markers = if all && draft.hand.suction.is_none() {
         between_fingers(&model, fingers, grasp)
     } else {
         Vec::new()
@@ -185,54 +278,61 @@ fn assembled(
     if !markers.is_empty() {
         let note = "their shapes are between the fingers, where objects are held".to_owned();
         notes.insert("no_collision_links", note);
-        profile.no_collision_links.extend(markers);
-        model = with_grasp(&profile)?.0;
+        draft.core.no_collision_links.extend(markers);
+        model = draft.with_grasp()?.0;
     }
-    let is_short = all
-        && body.is_table_top
-        && short_arm::put_on_surface(&mut profile, &model, grasp, body.lowest_m, &mut notes)?;
-    if profile.home.is_empty() {
-        (profile.home, profile.postures) = postures::find(&profile, &model, grasp, &mut notes)?;
+    let on_surface = if all && body.is_table_top {
+        short_arm::on_surface(draft.roles(), &model, grasp, body.lowest_m, &mut notes)?
+    } else {
+        None
+    };
+    if let Some(place) = &on_surface {
+        draft.core.on_surface = true;
+        draft.core.mount_height_m = place.height_m;
+        draft.core.mount_turned_rad = place.turned_rad;
     }
-    if is_short {
-        short_arm::measure_reach(&mut profile, &model, grasp, &mut notes)?;
+    let (home, postures) = match &partial.home {
+        Some(home) => (home.clone(), partial.postures.clone()),
+        None => postures::find(draft.roles(), &model, grasp, &mut notes)?,
+    };
+    if on_surface.is_some() {
+        draft.core.reach_m =
+            short_arm::reach_m(draft.roles(), &postures, &model, grasp, &mut notes)?;
     }
     if all {
-        let others = parked(partial, &profile, &hand.others, &mut notes, effort);
-        profile.parked.extend(others);
+        let parked = parked(partial, draft.roles(), &others, &mut notes, effort);
+        draft.core.parked.extend(parked);
     }
     // Joints without a role are rigid from now on: a finger that no named joint moves may narrow
     // the opening.
-    let narrower = Named::find(&profile, &RobotModel::read(&profile)?)?
+    let narrower = Named::find(draft.roles(), &RobotModel::read(draft.roles())?)?
         .layout
         .gripper
         .widest_m();
-    if partial.max_opening_m == 0.0 && narrower > LEAST_OPENING_M {
-        profile.max_opening_m = profile.max_opening_m.min(fingers::as_opening(narrower));
+    if partial.hand.lacks_opening() && narrower > LEAST_OPENING_M {
+        let opening_m = &mut draft.hand.max_opening_m;
+        *opening_m = opening_m.min(fingers::as_opening(narrower));
     }
-    Ok(Proposal {
-        profile,
-        notes,
-        other_hands: hand.others,
-        unknown_hand: None,
-    })
+    let profile = draft.with_postures(home, postures);
+    Ok(Completed { profile, notes })
 }
 
 /// The joints of the other arms at their homes. Stretched out, as all joints are at 0 for some
 /// robots, it is in the way.
 fn parked(
-    bare: &RobotProfile,
-    own: &RobotProfile,
+    bare: &StatedRobot,
+    own: RobotRoles<'_>,
     others: &[String],
-    notes: &mut BTreeMap<&'static str, String>,
+    notes: &mut Notes,
     effort: &mut Effort,
 ) -> Vec<(String, f64)> {
     let own: Vec<&String> = own
+        .core
         .base_joints
         .iter()
         .flatten()
-        .chain(&own.arm_joints)
-        .chain(&own.head_joints)
+        .chain(own.arm_joints)
+        .chain(&own.core.head_joints)
         .collect();
     let mut parked: Vec<(String, f64)> = Vec::new();
     let mut hands = Vec::new();
@@ -274,46 +374,105 @@ fn parked(
 
 /// A profile for the hand at a link, without one for the other hands.
 fn home_of(
-    bare: &RobotProfile,
+    bare: &StatedRobot,
     palm: &str,
     effort: &mut Effort,
 ) -> Result<RobotProfile, RobotError> {
-    let name = bare.urdf.name.to_string();
-    let model = thumb::without_roles(bare).map_err(|error| error.named(&name))?;
-    let hand =
-        fingers::find(bare, &model, Some(palm), effort).map_err(|error| error.named(&name))?;
-    let mut notes = BTreeMap::new();
-    let body = body::find(&model, hand.palm, &hand.others, &mut notes);
-    let arm_joints = body
-        .arm
-        .iter()
-        .map(|idx| model.joints[*idx].name.clone())
-        .collect();
+    let name = &bare.core.urdf.name;
+    let model = thumb::without_roles(bare).map_err(|error| error.named(name))?;
+    let found =
+        fingers::find(&bare.hand, &model, Some(palm), effort).map_err(|error| error.named(name))?;
+    let mut notes = Notes::new();
+    let body = body::find(&model, found.palm, &found.others, &mut notes);
+    let arm = body.arm.iter();
     let planar_base = body.drives && body.own_base.is_none();
-    let base_joints = planar_base.then(|| RobotProfile::PLANAR_JOINTS.map(str::to_owned));
-    let mount_height_m = body.mount_height_m;
-    let mut profile = RobotProfile {
-        arm_joints,
-        planar_base,
-        base_joints,
-        mount_height_m,
-        ..hand.profile
+    let draft = Draft {
+        core: RobotCore {
+            planar_base,
+            base_joints: planar_base.then(|| RobotCore::PLANAR_JOINTS.map(str::to_owned)),
+            mount_height_m: body.mount_height_m,
+            ..bare.core.clone()
+        },
+        arm_joints: arm.map(|idx| model.joints[*idx].name.clone()).collect(),
+        hand: found.hand,
+        camera: body.camera,
     };
-    (profile.camera_link, profile.camera_turned_rad) = (body.camera_link, body.camera_turned_rad);
-    let (model, grasp) = with_grasp(&profile)?;
-    (profile.home, profile.postures) = postures::find(&profile, &model, grasp, &mut notes)?;
-    Ok(profile)
+    let (model, grasp) = draft.with_grasp()?;
+    let (home, postures) = postures::find(draft.roles(), &model, grasp, &mut notes)?;
+    Ok(draft.with_postures(home, postures))
 }
 
-/// The model of a profile with its base, so that inverse kinematics moves it too, and the frame of
-/// its grasp.
-fn with_grasp(profile: &RobotProfile) -> Result<(Arc<RobotModel>, GraspFrame), RobotError> {
-    let model = Arc::new(RobotModel::read(profile)?);
-    let grasp = frame(
-        &model,
-        &profile.grasp_link,
-        profile.grasp_offset_m,
-        profile.grasp_turned_rad,
-    )?;
-    Ok((model, grasp))
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use actcheck_base::Files;
+    use actcheck_data::{FINGER_FRICTION, GRIP_FORCE_N, StatedFingers};
+    use std::path::Path;
+
+    fn arm() -> StatedRobot {
+        let path = Path::new("models/robots/fixed_arm.toml");
+        actcheck_config::robot::read(&Files::Shipped, path).expect("the shipped robot is valid")
+    }
+
+    fn fingers(robot: &mut StatedRobot) -> &mut StatedFingers {
+        match &mut robot.hand {
+            StatedHand::Fingers(fingers) => fingers,
+            StatedHand::Cup { .. } => panic!("the shipped robot has fingers"),
+        }
+    }
+
+    fn completed(robot: &StatedRobot) -> Completed {
+        complete(robot).unwrap_or_else(|error| panic!("{error}"))
+    }
+
+    fn named(completed: &Completed) -> Vec<&'static str> {
+        completed.notes.keys().copied().collect()
+    }
+
+    #[test]
+    fn nothing_is_found_for_a_profile_that_states_all_roles() {
+        let mut robot = arm();
+        let own = fingers(&mut robot);
+        (own.finger_friction, own.grip_force_n) = (Some(0.7), Some(20.0));
+        let completed = completed(&robot);
+        assert_eq!(named(&completed), Vec::<&str>::new());
+        assert_eq!(Ok(completed.profile), robot.complete());
+    }
+
+    #[test]
+    fn defaults_are_named() {
+        let mut robot = arm();
+        let own = fingers(&mut robot);
+        (own.finger_friction, own.grip_force_n) = (None, None);
+        let completed = completed(&robot);
+        assert_eq!(named(&completed), ["finger_friction", "grip_force_n"]);
+        let hand = completed.profile.hand;
+        assert_eq!(
+            (hand.finger_friction, hand.grip_force_n),
+            (FINGER_FRICTION, GRIP_FORCE_N)
+        );
+    }
+
+    /// Only the roles that are left out are found and named; the others stay as they are.
+    #[test]
+    fn measurements_are_named() {
+        let mut robot = arm();
+        let own = fingers(&mut robot);
+        (own.finger_friction, own.grip_force_n) = (Some(0.7), Some(20.0));
+        let whole = robot.complete().expect("it states all roles");
+        robot.camera = None;
+        let found = completed(&robot);
+        assert_eq!(named(&found), ["camera_link"]);
+        assert_eq!(found.profile.arm_joints, whole.arm_joints);
+        assert_eq!(
+            (found.profile.hand, found.profile.home),
+            (whole.hand, whole.home)
+        );
+        robot.home = None;
+        let found = named(&completed(&robot));
+        assert_eq!(found, ["camera_link", "home", "postures"]);
+        robot.arm_joints = None;
+        let found = named(&completed(&robot));
+        assert_eq!(found, ["arm_joints", "camera_link", "home", "postures"]);
+    }
 }

@@ -13,7 +13,7 @@ use crate::description::{JointKind, RobotModel};
 use crate::ik::{self, IkRequest};
 use crate::layout::Named;
 use crate::{Kinematics, RobotError, SelfContact};
-use actcheck_data::{Pose, RobotProfile, Stream};
+use actcheck_data::{Pose, RobotRoles, Stream};
 
 /// Random postures from which home is chosen.
 const N_SAMPLES: u64 = 300;
@@ -42,7 +42,7 @@ const ASIDE_RAD: f64 = -1.3;
 /// slant to one side of it. Unit: radians.
 const LARGEST_TURN_RAD: f64 = std::f64::consts::PI;
 
-type Postures = (Vec<f64>, Vec<Vec<f64>>);
+pub(super) type Postures = (Vec<f64>, Vec<Vec<f64>>);
 
 /// The robot with its root above the floor.
 pub(super) struct Standing {
@@ -56,13 +56,14 @@ pub(super) struct Standing {
 
 impl Standing {
     pub(super) fn new(
-        profile: &RobotProfile,
+        roles: RobotRoles<'_>,
         model: &Arc<RobotModel>,
         grasp: GraspFrame,
     ) -> Result<Self, RobotError> {
-        let root = Pose::upright([0.0, 0.0, profile.mount_height_m], profile.mount_turned_rad)
-            .to_isometry();
-        let named = Named::find(profile, model)?;
+        let RobotRoles { core, hand, .. } = roles;
+        let root =
+            Pose::upright([0.0, 0.0, core.mount_height_m], core.mount_turned_rad).to_isometry();
+        let named = Named::find(roles, model)?;
         let kinematics = Kinematics::new(Arc::clone(model), root, grasp, named.camera)
             .with_passing(named.passing(model), named.links_of_hand(model))
             .with_followers(&named.layout.gripper);
@@ -76,7 +77,7 @@ impl Standing {
         named
             .layout
             .gripper
-            .set(&mut start, profile.max_opening_m / 2.0);
+            .set(&mut start, hand.max_opening_m / 2.0);
         Ok(Self {
             kinematics,
             arm,
@@ -110,18 +111,15 @@ impl Standing {
 
 /// Finds the posture at home and the seeds.
 pub(super) fn find(
-    profile: &RobotProfile,
+    roles: RobotRoles<'_>,
     model: &Arc<RobotModel>,
     grasp: GraspFrame,
     notes: &mut BTreeMap<&'static str, String>,
 ) -> Result<Postures, RobotError> {
-    let standing = Standing::new(profile, model, grasp)?;
+    let standing = Standing::new(roles, model, grasp)?;
     let (mut search, samples) = standing.search();
-    let aside = if profile.base_joints.is_none() {
-        search.aside()
-    } else {
-        None
-    };
+    let is_fixed = roles.core.base_joints.is_none();
+    let aside = if is_fixed { search.aside() } else { None };
     search.near.clone_from(&aside);
     if let Some(note) = notes.get_mut("arm_joints") {
         let (shoulder, length) = search.arm_reach();
@@ -140,16 +138,16 @@ pub(super) fn find(
         .filter_map(|target| search.reach(target))
         .collect();
     beyond_body::add(&mut search, &targets, &mut postures);
-    let home = match profile.base_joints {
-        Some(_) => search.compact(samples, &postures),
-        None => aside.or_else(|| postures.first().cloned()),
+    let home = match is_fixed {
+        false => search.compact(samples, &postures),
+        true => aside.or_else(|| postures.first().cloned()),
     };
     let home = home.unwrap_or_else(|| search.start.clone());
     notes.insert(
         "home",
-        match profile.base_joints {
-            Some(_) => "the hand is near the body, and no links overlap".to_owned(),
-            None => "the hand points down beside the base".to_owned(),
+        match is_fixed {
+            false => "the hand is near the body, and no links overlap".to_owned(),
+            true => "the hand points down beside the base".to_owned(),
         },
     );
     notes.insert(

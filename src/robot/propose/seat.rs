@@ -98,7 +98,7 @@ mod tests {
     /// deeper an object belongs.
     fn deeper(hinge_m: f64) -> f64 {
         let path = Path::new("models/robots/mobile_manipulator.toml");
-        let mut profile = actcheck_config::robot::read(&Files::Shipped, path)
+        let shipped = actcheck_config::robot::read(&Files::Shipped, path)
             .expect("the shipped robot is valid");
         let inertial = "<inertial><mass value=\"0.1\"/>\
                         <inertia ixx=\"1e-4\" ixy=\"0\" ixz=\"0\" iyy=\"1e-4\" iyz=\"0\" izz=\"1e-4\"/></inertial>";
@@ -124,10 +124,10 @@ mod tests {
              <origin xyz=\"{hinge_m} 0.02 0\"/><axis xyz=\"0 0 1\"/>\
              <limit lower=\"0\" upper=\"1.4\" effort=\"5\" velocity=\"2\"/></joint></robot>"
         );
-        profile = actcheck_config::robot::with_urdf(profile, Source::new("hand.urdf", text))
+        let core = actcheck_config::robot::with_urdf(shipped.core, Source::new("hand.urdf", text))
             .expect("it is a URDF");
-        profile.finger_joints = vec!["jaw".to_owned()];
-        let model = RobotModel::read(&profile).expect("the hand is valid");
+        let model = RobotModel::without_roles(&core).expect("the hand is valid");
+        let jaw = model.joint("jaw").expect("it has a jaw");
         let links = ["jaw", "palm"].map(|name| {
             model
                 .links
@@ -137,7 +137,7 @@ mod tests {
         });
         let frame = |depth_m: f64| Isometry3::translation(0.055 - depth_m, 0.0, 0.0);
         let at =
-            |depth_m: f64| Gripper::find(&profile, &model, links, (links[1], frame(depth_m))).ok();
+            |depth_m: f64| Gripper::find(&[jaw], &model, links, (links[1], frame(depth_m))).ok();
         deeper_m(&model, links, (links[1], frame(0.0)), at)
     }
 

@@ -11,7 +11,7 @@ use super::postures::{Search, Standing, hand};
 use crate::RobotError;
 use crate::description::RobotModel;
 use crate::ik::IkRequest;
-use actcheck_data::RobotProfile;
+use actcheck_data::RobotRoles;
 
 /// Longest arm that is mounted on the surface. Unit: metres. In front of a table, an arm has a
 /// quarter of a metre before it.
@@ -32,22 +32,32 @@ const STEP_M: f64 = 0.01;
 /// Random seeds for each distance, besides the postures of the profile.
 const N_SEEDS: usize = 6;
 
-/// Mounts a short arm on the surface, with its lowest shape there, so that it works along the x
-/// axis. Returns whether it is short.
-pub(super) fn put_on_surface(
-    profile: &mut RobotProfile,
+/// The place of an arm on the surface.
+pub(super) struct OnSurface {
+    /// Height of its root above the surface. Unit: metres.
+    pub(super) height_m: f64,
+    /// Rotation of its root about the vertical. Unit: radians.
+    pub(super) turned_rad: f64,
+}
+
+/// Returns the place of a short arm on the surface: with its lowest shape there, so that it works
+/// along the x axis. Returns `None` if the arm is not short.
+pub(super) fn on_surface(
+    roles: RobotRoles<'_>,
     model: &Arc<RobotModel>,
     grasp: GraspFrame,
     lowest_m: f64,
     notes: &mut BTreeMap<&'static str, String>,
-) -> Result<bool, RobotError> {
-    let standing = Standing::new(profile, model, grasp)?;
+) -> Result<Option<OnSurface>, RobotError> {
+    let standing = Standing::new(roles, model, grasp)?;
     let (search, samples) = standing.search();
     if search.arm_reach().1 > SHORT_M {
-        return Ok(false);
+        return Ok(None);
     }
-    profile.on_surface = true;
-    profile.mount_height_m = (-lowest_m * 1e3).round() / 1e3;
+    let mut place = OnSurface {
+        height_m: (-lowest_m * 1e3).round() / 1e3,
+        turned_rad: roles.core.mount_turned_rad,
+    };
     notes.remove("mount_height_m");
     notes.insert(
         "mount",
@@ -57,30 +67,30 @@ pub(super) fn put_on_surface(
         .bearing(&samples)
         .map_or(0.0, |bearing| (bearing / FRAC_PI_2).round());
     if quarters != 0.0 {
-        profile.mount_turned_rad = -(quarters * FRAC_PI_2 * 1e4).round() / 1e4;
+        place.turned_rad = -(quarters * FRAC_PI_2 * 1e4).round() / 1e4;
         notes.insert(
             "mount_turned_rad",
             "the middle of the arm's range then points forwards".to_owned(),
         );
     }
-    Ok(true)
+    Ok(Some(place))
 }
 
 /// Measures at which distances from its root the arm takes objects from above.
-pub(super) fn measure_reach(
-    profile: &mut RobotProfile,
+pub(super) fn reach_m(
+    roles: RobotRoles<'_>,
+    postures: &[Vec<f64>],
     model: &Arc<RobotModel>,
     grasp: GraspFrame,
     notes: &mut BTreeMap<&'static str, String>,
-) -> Result<(), RobotError> {
-    let standing = Standing::new(profile, model, grasp)?;
+) -> Result<Option<[f64; 2]>, RobotError> {
+    let standing = Standing::new(roles, model, grasp)?;
     let (mut search, _) = standing.search();
-    profile.reach_m = distances(&mut search, &profile.postures);
     notes.insert(
         "reach_m",
         "where the hand takes low objects from above and tall ones, and lifts them".to_owned(),
     );
-    Ok(())
+    Ok(distances(&mut search, postures))
 }
 
 /// The nearest and farthest of these distances.

@@ -9,7 +9,7 @@ use super::fingers::leader;
 use crate::description::RobotModel;
 use crate::layout::frame;
 use crate::{GripperFault, RobotError};
-use actcheck_data::RobotProfile;
+use actcheck_data::StatedFingers;
 
 /// Why no gripper was found.
 pub(super) enum NoHand {
@@ -38,7 +38,7 @@ impl From<RobotError> for NoHand {
     }
 }
 
-/// The parts of the gripper that a profile names.
+/// The fingers that a profile names, resolved on the model.
 pub(super) struct Stated {
     pub(super) links: Option<[usize; 2]>,
     pub(super) joints: Vec<usize>,
@@ -47,11 +47,10 @@ pub(super) struct Stated {
 }
 
 impl Stated {
-    pub(super) fn of(profile: &RobotProfile, model: &RobotModel) -> Result<Self, RobotError> {
-        let [left, right] = &profile.finger_links;
-        let links = match left.is_empty() {
-            true => None,
-            false => Some([model.frame(left)?.0, model.frame(right)?.0]),
+    pub(super) fn of(fingers: &StatedFingers, model: &RobotModel) -> Result<Self, RobotError> {
+        let links = match &fingers.finger_links {
+            Some([left, right]) => Some([model.frame(left)?.0, model.frame(right)?.0]),
+            None => None,
         };
         let led_here = |joint: usize| {
             model
@@ -60,20 +59,12 @@ impl Stated {
                 .find(|(_, own)| **own == joint)
                 .map_or(joint, |(new, _)| *new)
         };
-        let named = profile
-            .finger_joints
-            .iter()
-            .map(|name| model.joint(name).map(led_here));
-        let joints = named.collect::<Result<Vec<_>, _>>()?;
-        let grasp = match profile.grasp_link.is_empty() {
-            true => None,
-            false => Some(frame(
-                model,
-                &profile.grasp_link,
-                profile.grasp_offset_m,
-                profile.grasp_turned_rad,
-            )?),
-        };
+        let named = fingers.finger_joints.iter().flatten();
+        let joints = named
+            .map(|name| model.joint(name).map(led_here))
+            .collect::<Result<Vec<_>, _>>()?;
+        let grasp = fingers.grasp.as_ref().map(|grasp| frame(model, grasp));
+        let grasp = grasp.transpose()?;
         Ok(Self {
             links,
             joints,

@@ -9,7 +9,7 @@ use super::fingers::{self, ProposedHand};
 use super::hands::groups;
 use super::stated::NoHand;
 use crate::description::{JointKind, RobotModel};
-use actcheck_data::RobotProfile;
+use actcheck_data::{RobotCore, StatedHand, StatedRobot};
 
 /// Share of the way from 0 to a limit at which a thumb is parked: at the limit itself it may touch
 /// the wrist.
@@ -32,19 +32,15 @@ const CLEARLY: f64 = 1.1;
 /// [`NoHand`] as [`fingers::find`], with the thumb at 0, if there is none with a turned thumb
 /// either.
 pub(super) fn find(
-    partial: &RobotProfile,
+    partial: &StatedRobot,
     wanted: Option<&str>,
     effort: &mut Effort,
 ) -> Result<(RobotModel, ProposedHand), NoHand> {
     let model = without_roles(partial)?;
     let mut part = effort.part(2);
-    let at_zero = fingers::find(partial, &model, wanted, &mut part);
+    let at_zero = fingers::find(&partial.hand, &model, wanted, &mut part);
     effort.join(&part);
-    let is_stated = !partial.finger_joints.is_empty()
-        || !partial.finger_links[0].is_empty()
-        || !partial.grasp_link.is_empty()
-        || partial.suction.is_some();
-    if is_stated {
+    if !partial.hand.is_unknown() {
         return at_zero.map(|hand| (model, hand));
     }
     let palms: Vec<usize> = match &at_zero {
@@ -59,14 +55,9 @@ pub(super) fn find(
     let n_thumbs = thumbs.len();
     for (place, (joint, position)) in thumbs.into_iter().enumerate() {
         let thumb = (joint.clone(), position);
-        let other_model = with_rigid(partial, vec![thumb.clone()])?;
-        let parked = partial.parked.iter().cloned().chain([thumb]).collect();
-        let with_thumb = RobotProfile {
-            parked,
-            ..partial.clone()
-        };
+        let other_model = with_rigid(&partial.core, vec![thumb.clone()])?;
         let mut part = effort.part(n_thumbs - place);
-        let other = fingers::find(&with_thumb, &other_model, wanted, &mut part);
+        let other = fingers::find(&partial.hand, &other_model, wanted, &mut part);
         effort.join(&part);
         let Ok(mut other) = other else { continue };
         if best
@@ -79,21 +70,28 @@ pub(super) fn find(
             "parked_joints",
             format!("`{joint}` turns the thumb opposite the fingers"),
         );
+        other.thumb = Some(thumb);
         best = Ok((other_model, other));
     }
     best
 }
 
 /// The model in which all joints move but those that the profile parks in its fingers.
-pub(super) fn without_roles(partial: &RobotProfile) -> Result<RobotModel, NoHand> {
-    let model = with_rigid(partial, Vec::new())?;
-    let links = partial
-        .finger_links
-        .iter()
+pub(super) fn without_roles(partial: &StatedRobot) -> Result<RobotModel, NoHand> {
+    let StatedRobot { core, hand, .. } = partial;
+    let model = with_rigid(core, Vec::new())?;
+    let (links, joints) = match hand {
+        StatedHand::Cup { grasp, .. } => (vec![&grasp.link], Vec::new()),
+        StatedHand::Fingers(fingers) => (
+            fingers.finger_links.iter().flatten().collect(),
+            fingers.finger_joints.iter().flatten().collect(),
+        ),
+    };
+    let links = links
+        .into_iter()
         .filter_map(|name| Some(model.frame(name).ok()?.0));
-    let joints = partial
-        .finger_joints
-        .iter()
+    let joints = joints
+        .into_iter()
         .filter_map(|name| Some(model.joint(name).ok()? + 1));
     let in_fingers: BTreeSet<usize> = links
         .chain(joints)
@@ -104,7 +102,7 @@ pub(super) fn without_roles(partial: &RobotProfile) -> Result<RobotModel, NoHand
             .joint(name)
             .is_ok_and(|joint| in_fingers.contains(&joint))
     };
-    let parked: Vec<(String, f64)> = partial
+    let parked: Vec<(String, f64)> = core
         .parked
         .iter()
         .filter(|(name, _)| is_in_finger(name))
@@ -113,17 +111,16 @@ pub(super) fn without_roles(partial: &RobotProfile) -> Result<RobotModel, NoHand
     if parked.is_empty() {
         Ok(model)
     } else {
-        with_rigid(partial, parked)
+        with_rigid(core, parked)
     }
 }
 
 /// The model in which all joints move but these, which are rigid at their positions.
-fn with_rigid(partial: &RobotProfile, parked: Vec<(String, f64)>) -> Result<RobotModel, NoHand> {
-    Ok(RobotModel::read(&RobotProfile {
-        arm_joints: Vec::new(),
+fn with_rigid(core: &RobotCore, parked: Vec<(String, f64)>) -> Result<RobotModel, NoHand> {
+    Ok(RobotModel::without_roles(&RobotCore {
         planar_base: false,
         parked,
-        ..partial.clone()
+        ..core.clone()
     })?)
 }
 

@@ -1,19 +1,19 @@
 //! The hand of a robot without fingers that oppose each other, or without names for them: its
 //! profile has everything else, and lists the joints that could move fingers.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::body::chain;
-use super::fingers::{ProposedHand, is_called, others_than, rank, rounded};
+use super::fingers::{ProposedHand, is_called, others_than, rank, written};
 use super::frames::corners;
 use super::hands::groups;
 use super::stated::NoHand;
 use super::thumb;
 use crate::GripperFault;
 use crate::description::{JointKind, RobotModel};
-use actcheck_data::{RobotProfile, Suction};
+use actcheck_data::{Hand, LinkFrame, ModelTree, StatedRobot, Suction};
 
 /// Fewest joints of an arm whose hand has no names of fingers.
 const FEWEST_BEFORE_HAND: usize = 3;
@@ -33,13 +33,9 @@ const PLACEHOLDER: Suction = Suction {
 pub struct UnknownHand {
     /// Why no fingers were found.
     pub fault: GripperFault,
-    /// The link at the end of the arm.
-    pub palm: String,
-    /// A point between the links beyond the palm. Frame: palm. Unit: metres.
-    pub offset_m: [f64; 3],
-    /// Rotation of a frame whose x axis points from the palm to that point: about the fixed x, y
-    /// and z axes, in this order. Unit: radians.
-    pub turned_rad: [f64; 3],
+    /// A frame on the palm, the link at the end of the arm: its origin is between the links beyond
+    /// the palm, and its x axis points from the palm to there.
+    pub grasp: LinkFrame,
     /// The movable joints beyond the palm; parents come before their children.
     pub joints: Vec<FingerJoint>,
 }
@@ -69,7 +65,7 @@ pub struct FingerJoint {
 /// [`NoHand`] with this fault if the robot has no arm, or with another if no arm has the wanted
 /// name.
 pub(super) fn find(
-    partial: &RobotProfile,
+    partial: &StatedRobot,
     wanted: Option<&str>,
     fault: GripperFault,
 ) -> Result<(RobotModel, ProposedHand, UnknownHand), NoHand> {
@@ -85,51 +81,22 @@ pub(super) fn find(
     let beyond = beyond(&model, palm);
     let inside: BTreeSet<usize> = beyond.iter().map(|joint| joint + 1).collect();
     let frame = ahead(&model, palm, &beyond);
-    let (roll, pitch, yaw) = frame.rotation.euler_angles();
     let hand = UnknownHand {
         fault,
-        palm: model.links[palm].name.clone(),
-        offset_m: rounded(frame.translation.vector.into()),
-        turned_rad: rounded([roll, pitch, yaw]),
+        grasp: written(model.links[palm].name.clone(), &frame),
         joints: beyond
             .iter()
-            .map(|joint| candidate(partial, &model, *joint))
+            .map(|joint| candidate(&partial.core.tree, &model, *joint))
             .collect(),
     };
-    let profile = RobotProfile {
-        grasp_link: hand.palm.clone(),
-        grasp_offset_m: hand.offset_m,
-        grasp_turned_rad: hand.turned_rad,
-        ..partial.clone()
-    };
+    let others = groups
+        .into_iter()
+        .filter(|(other, _)| !inside.contains(other));
     let placeholder = ProposedHand {
-        profile: profile.with_cup(PLACEHOLDER),
-        palm,
-        notes: BTreeMap::new(),
-        others: {
-            let others = groups
-                .into_iter()
-                .filter(|(other, _)| !inside.contains(other));
-            others_than(&model, &others.collect(), palm)
-        },
-        score: 0.0,
+        others: others_than(&model, &others.collect(), palm),
+        ..ProposedHand::known(Hand::of_cup(hand.grasp.clone(), PLACEHOLDER), palm)
     };
     Ok((model, placeholder, hand))
-}
-
-/// Returns the profile without the tool in place of the fingers.
-pub(super) fn without_placeholder(profile: RobotProfile, bare: &RobotProfile) -> RobotProfile {
-    RobotProfile {
-        finger_links: bare.finger_links.clone(),
-        grasp_link: String::new(),
-        grasp_offset_m: [0.0; 3],
-        grasp_turned_rad: [0.0; 3],
-        max_opening_m: 0.0,
-        finger_friction: bare.finger_friction,
-        grip_force_n: bare.grip_force_n,
-        suction: None,
-        ..profile
-    }
 }
 
 /// The link that carries several fingers, if this one is part of a finger: fingers of which only the
@@ -211,9 +178,9 @@ fn ahead(model: &RobotModel, palm: usize, beyond: &[usize]) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(way), turned)
 }
 
-fn candidate(partial: &RobotProfile, model: &RobotModel, joint: usize) -> FingerJoint {
+fn candidate(tree: &ModelTree, model: &RobotModel, joint: usize) -> FingerJoint {
     let own = &model.joints[joint];
-    let in_file = partial.tree.joint(&own.name);
+    let in_file = tree.joint(&own.name);
     FingerJoint {
         name: own.name.clone(),
         link: model.links[joint + 1].name.clone(),

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::Isometry3;
 
-use super::between::{Between, driven};
+use super::between::Between;
 use crate::Gripper;
 use crate::description::RobotModel;
 use crate::gripper::Probe;
@@ -67,14 +67,12 @@ pub(super) fn innermost(
     joints: &BTreeSet<usize>,
 ) -> f64 {
     let Between {
-        bare,
         model,
         palm,
         links,
         named,
     } = between;
-    let profile = driven(bare, model, named);
-    let Ok(gripper) = Gripper::find_coarse(&profile, model, *links, (*palm, frame)) else {
+    let Ok(gripper) = Gripper::find_coarse(named, model, *links, (*palm, frame)) else {
         return 1.0;
     };
     let mut positions = vec![0.0; model.joints.len()];
