@@ -128,7 +128,7 @@ fn labels_at_random_are_no_evidence_and_an_imported_campaign_needs_some() {
     let runs = history.runs(&RunFilter::default()).unwrap();
     let mut labels = "run,property,label\n".to_owned();
     for (idx, run) in runs.iter().enumerate() {
-        let label = if idx % 5 == 2 { "fail" } else { "pass" };
+        let label = if idx % 4 == 2 { "fail" } else { "pass" };
         labels += &format!("{},MovedObject,{label}\n", run.run);
     }
     std::fs::write(folder.path().join("labels.csv"), labels).unwrap();

@@ -1,6 +1,6 @@
 //! Limits that are fitted to passing runs, and their false alarms in others.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::{Interval, TwoByTwo, wilson};
 
@@ -47,7 +47,6 @@ impl MinedLimit {
     /// their ids. Returns `None` with too few values, or with values that a fixed limit does not
     /// separate.
     pub fn of(values: &BTreeMap<String, f64>, beyond: Beyond) -> Option<Self> {
-        let is_held_out = |idx: usize| idx % 3 == 2;
         let part = |held_out: bool| {
             let some = values.values().enumerate();
             some.filter(move |(idx, _)| is_held_out(*idx) == held_out)
@@ -101,21 +100,43 @@ impl MinedLimit {
         wilson(self.false_alarms, self.held_out)
     }
 
-    /// Returns the number of values with a bad label beyond the limit, if these are more than by
-    /// chance.
-    pub fn caught(&self, bad: &BTreeMap<String, f64>, beyond: Beyond) -> Option<u64> {
-        let caught = bad
-            .values()
-            .filter(|value| self.is_beyond(**value, beyond))
-            .count() as u64;
+    /// Returns the ids of the runs that a limit is fitted to.
+    pub fn fitted_runs(values: &BTreeMap<String, f64>) -> BTreeSet<&str> {
+        let some = values.keys().enumerate();
+        some.filter(|(idx, _)| !is_held_out(*idx))
+            .map(|(_, run)| run.as_str())
+            .collect()
+    }
+
+    /// Returns the number of runs with a bad label beyond the limit, if these are more than by
+    /// chance. `good` are runs with good labels to which the limit was not fitted, whatever the
+    /// verdicts about them are.
+    pub fn caught(
+        &self,
+        bad: &BTreeMap<String, f64>,
+        good: &BTreeMap<String, f64>,
+        beyond: Beyond,
+    ) -> Option<u64> {
+        let beyond_in = |values: &BTreeMap<String, f64>| {
+            let beyond = values
+                .values()
+                .filter(|value| self.is_beyond(**value, beyond));
+            beyond.count() as u64
+        };
+        let (caught, alarms) = (beyond_in(bad), beyond_in(good));
         let table = TwoByTwo {
             failed_in: caught,
-            passed_in: self.false_alarms,
+            passed_in: alarms,
             failed_out: bad.len() as u64 - caught,
-            passed_out: self.held_out - self.false_alarms,
+            passed_out: good.len() as u64 - alarms,
         };
         (caught >= FEWEST_CAUGHT && table.fisher().greater <= LEVEL).then_some(caught)
     }
+}
+
+/// Whether a run is one of the third ones, to which limits are not fitted.
+fn is_held_out(idx: usize) -> bool {
+    idx % 3 == 2
 }
 
 /// Rounds to two digits, upwards or downwards.
@@ -170,7 +191,16 @@ mod tests {
         let found = MinedLimit::of(&values(|idx| (idx % 10) as f64, 300), Beyond::Above)
             .expect("there are enough");
         let far = |n_far: usize| values(|idx| if idx < n_far { 20.0 } else { 3.0 }, 20);
-        assert_eq!(found.caught(&far(8), Beyond::Above), Some(8));
-        assert_eq!(found.caught(&far(2), Beyond::Above), None);
+        assert_eq!(found.caught(&far(8), &far(0), Beyond::Above), Some(8));
+        assert_eq!(
+            found.caught(&far(2), &far(0), Beyond::Above),
+            None,
+            "too few"
+        );
+        assert_eq!(
+            found.caught(&far(8), &far(7), Beyond::Above),
+            None,
+            "good runs do the same"
+        );
     }
 }

@@ -73,6 +73,8 @@ struct Confirmed {
     found: MinedLimit,
     /// Values in runs that people labelled as bad.
     bad: BTreeMap<String, f64>,
+    /// Values in runs that people labelled as good, without those that the limit is fitted to.
+    good: BTreeMap<String, f64>,
 }
 
 /// A property to propose.
@@ -164,6 +166,8 @@ struct Runs {
     good: Vec<RunRow>,
     /// Those with a bad label.
     bad: Vec<RunRow>,
+    /// Those with good labels only, whatever the verdicts about them are.
+    labelled_good: Vec<RunRow>,
 }
 
 impl Runs {
@@ -181,18 +185,20 @@ impl Runs {
                 _ => failed.insert(row.run),
             };
         }
-        let bad: BTreeSet<&str> = labels
-            .into_iter()
-            .flatten()
-            .filter(|label| !label.passes)
-            .map(|label| label.run.as_str())
-            .collect();
+        let labelled = |passes: bool| -> BTreeSet<&str> {
+            let labels = labels.into_iter().flatten();
+            let such = labels.filter(|label| label.passes == passes);
+            such.map(|label| label.run.as_str()).collect()
+        };
+        let (bad, good) = (labelled(false), labelled(true));
         let rows = history.runs(&filter)?.into_iter();
         let rows = rows.filter(|row| row.status == RunStatus::Completed);
         let (bad, rest): (Vec<RunRow>, Vec<RunRow>) =
             rows.partition(|row| bad.contains(row.run.as_str()));
         let is_good = |row: &RunRow| passed.contains(&row.run) && !failed.contains(&row.run);
+        let is_labelled = |row: &&RunRow| good.contains(row.run.as_str());
         Ok(Self {
+            labelled_good: rest.iter().filter(is_labelled).cloned().collect(),
             good: rest.into_iter().filter(is_good).collect(),
             bad,
         })
@@ -216,14 +222,19 @@ fn confirmed(
         .collect();
     let good = measure(history, &runs.good, known, &all, (jobs, stop))?;
     let bad = measure(history, &runs.bad, known, &all, (jobs, stop))?;
-    let found = all.into_iter().zip(good.into_iter().zip(bad));
+    let labelled = measure(history, &runs.labelled_good, known, &all, (jobs, stop))?;
+    let labels = bad.into_iter().zip(labelled);
+    let found = all.into_iter().zip(good).zip(labels);
     let mut confirmed: Vec<Confirmed> = found
-        .filter_map(|(candidate, (good, bad))| {
-            let found = MinedLimit::of(&good, beyond(candidate.side))?;
+        .filter_map(|((candidate, values), (bad, mut good))| {
+            let found = MinedLimit::of(&values, beyond(candidate.side))?;
+            let fitted = MinedLimit::fitted_runs(&values);
+            good.retain(|run, _| !fitted.contains(run.as_str()));
             found.is_confirmed().then_some(Confirmed {
                 candidate,
                 found,
                 bad,
+                good,
             })
         })
         .collect();
@@ -250,7 +261,7 @@ fn trials(
     let tests = &env.campaign.tests;
     let concerns = |fault: &Fault| {
         let mut tests = tests.iter();
-        tests.any(|test| fault.concerns(test, &env.campaign.robot))
+        tests.any(|test| fault.concerns(test, &env.campaign.robot.core))
     };
     let faults: Vec<Fault> = FAULTS.into_iter().filter(concerns).collect();
     let scenes = u64::from(args.scenes) * tests.len() as u64;
@@ -314,7 +325,9 @@ fn proposed(confirmed: Vec<Confirmed>, trials: &[Trial]) -> Vec<Proposed> {
             Proposed {
                 faults: noticed.collect(),
                 alone: unnoticed.iter().filter(fails).count() as u64,
-                caught: confirmed.found.caught(&confirmed.bad, side),
+                caught: confirmed
+                    .found
+                    .caught(&confirmed.bad, &confirmed.good, side),
                 confirmed,
             }
         })

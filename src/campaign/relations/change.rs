@@ -59,7 +59,7 @@ pub(super) fn changed(
 
 /// Swaps left and right of a scene on the empty floor, whose surface and robot are symmetric.
 fn mirrored(env: &Env, mut list: Vec<Choice>, scene: &Scene) -> Result<Vec<Choice>, String> {
-    let camera = &env.campaign.robot.camera_link;
+    let camera = &env.robot.profile.camera.link;
     if !env.campaign.worlds.is_empty() {
         return Err("a world has no mirror image".to_owned());
     }
