@@ -9,7 +9,7 @@ use actcheck_data::{
     ActionEnd, ActionReport, ActionTrace, Budget, Choices, ContactEpisode, Extremes, Form, Frames,
     RobotCourse, SceneMap, Snapshot, Trace,
 };
-use actcheck_world::{Playback, World, keep_playback};
+use actcheck_world::{OtherEngine, Playback, World, keep_playback, move_by};
 
 /// Performs the actions in order with the reference skills.
 ///
@@ -37,6 +37,8 @@ pub struct Interference<'a> {
     pub gate: Option<&'a mut dyn Gate>,
     /// Takes the robot's part of the run for another engine.
     pub playback: Option<&'a mut Option<Playback>>,
+    /// Steps the bodies instead of the physics engine.
+    pub other_engine: Option<Box<dyn OtherEngine>>,
 }
 
 /// Decides whether an action may be performed.
@@ -61,6 +63,9 @@ pub fn perform_with(
     world.localise(choices);
     if interference.playback.is_some() {
         keep_playback(world);
+    }
+    if let Some(engine) = interference.other_engine.take() {
+        move_by(world, engine);
     }
     let mut snapshots = vec![world.snapshot()];
     let mut memory = Memory::default();

@@ -7,7 +7,7 @@ use crate::line::{crashed, simulate};
 use crate::{Env, Failure, RunContext, RunInput};
 use actcheck_actions::{Cut, Interference};
 use actcheck_data::Choices;
-use actcheck_world::Playback;
+use actcheck_world::{OtherEngine, Playback};
 
 /// A run to make. Its choices can be made twice, because a crash consumes them.
 pub(super) struct Attempt<'a> {
@@ -47,15 +47,17 @@ impl Attempt<'_> {
         env: &Env,
         context: &RunContext,
     ) -> Result<FinishedRun, AttemptFault> {
-        self.make_played(env, context, None)
+        self.make_played(env, context, None, None)
     }
 
-    /// Makes the run, and takes the robot's part for another engine.
+    /// Makes the run, and takes the robot's part for another engine, which may also step the bodies
+    /// instead of this one.
     pub(super) fn make_played(
         &self,
         env: &Env,
         context: &RunContext,
         playback: Option<&mut Option<Playback>>,
+        other_engine: Option<Box<dyn OtherEngine>>,
     ) -> Result<FinishedRun, AttemptFault> {
         let input = || RunInput {
             campaign: self.campaign,
@@ -65,6 +67,7 @@ impl Attempt<'_> {
         let interference = Interference {
             cut: self.cut,
             playback,
+            other_engine,
             ..Interference::default()
         };
         let start = context.clock.start();

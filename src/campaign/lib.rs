@@ -49,6 +49,7 @@ mod starts;
 mod tally;
 mod workers;
 
+pub use actcheck_world::{EngineContact, EngineState, MovedObject, Setpoint};
 pub use actcheck_world::{FingerJoint, Proposal, UnknownHand};
 pub use budget::ExhaustedBudget;
 pub use changes::{ChangeKind, InputChange, changes, made_by_other_physics, other_physics};
@@ -63,7 +64,7 @@ pub use import::{ImportEnd, ImportOptions, ImportedCampaign, import, name_of_imp
 pub use last_failed::LastFailed;
 pub use line::{Clock, Disturbance, RunContext, RunInput, run_line, run_sabotaged};
 pub use outcome::{CampaignResult, Ending, WeightedRate};
-pub use playable::{Playable, PlayableRun, PlayedAction, playable};
+pub use playable::{EngineLink, Playable, PlayableRun, PlayedAction, playable, played_in};
 pub use recheck::{RecheckEnd, RecheckOptions, judge_stored, recheck};
 pub use relations::{RelateOptions, relate};
 pub use replay::{

@@ -169,6 +169,7 @@ pub(super) fn simulate(
         external,
         gate: None,
         playback: interference.playback,
+        other_engine: interference.other_engine,
     };
     let (trace, quality) = perform(env, test, &scene, &mut choices, disturb, interference)?;
     if program.as_ref().is_some_and(Performance::was_stopped) {
@@ -335,6 +336,7 @@ fn perform(
         saboteur,
         external,
         playback,
+        other_engine,
         ..
     } = interference;
     let external = external.map(|skill| skill as &mut dyn ExternalSkill);
@@ -344,6 +346,7 @@ fn perform(
         external,
         gate: Some(&mut preconditions),
         playback,
+        other_engine,
     };
     let trace = actions::perform_with(
         &calls,

@@ -3,13 +3,15 @@
 use std::collections::BTreeMap;
 
 use crate::attempt::Attempt;
-use crate::finished_run::RunPlace;
+use crate::finished_run::{FinishedRun, RunPlace};
 use crate::replay::{cut_secs, refused};
-use crate::{RunContext, StoredCampaign, mjcf, setpoints};
+use crate::{Env, RunContext, StoredCampaign, mjcf, setpoints};
 use actcheck_actions::Cut;
 use actcheck_base::{Diagnostic, Diagnostics};
-use actcheck_data::{CONTROL_HZ, Choices, Trace};
-use actcheck_history::{History, RunDetail, RunRecord};
+use actcheck_data::{CONTROL_HZ, Choice, Choices, Scene, Trace};
+use actcheck_history::{History, RunDetail, RunRecord, RunStatus};
+use actcheck_scenario as scenario;
+use actcheck_world::{EngineState, OtherEngine, Playback, Robot, Setpoint};
 
 /// A run that another engine can play.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,6 +52,51 @@ pub struct PlayableRun {
     pub record: RunRecord,
 }
 
+/// Another physics engine, which gets its scene in MJCF.
+pub trait EngineLink: Send {
+    /// Loads a scene. `joints` and `objects` are the names of the robot's joints and the ids of the
+    /// objects, in the order in which states are told; a tick has this length in seconds.
+    ///
+    /// # Errors
+    /// Why it can't, in words.
+    fn begin(
+        &mut self,
+        mjcf: &str,
+        joints: &[String],
+        objects: &[String],
+        tick_secs: f64,
+    ) -> Result<(), String>;
+
+    /// Performs a control tick.
+    ///
+    /// # Errors
+    /// Why it can't, in words.
+    fn tick(&mut self, setpoints: &[Setpoint]) -> Result<EngineState, String>;
+}
+
+/// A scene that is handed over to another engine.
+struct Handed {
+    run: String,
+    robot: Robot,
+    scene: Scene,
+    link: Box<dyn EngineLink>,
+}
+
+impl OtherEngine for Handed {
+    fn begin(&mut self, start: &Playback) -> Result<(), String> {
+        let joints = self.robot.model.joints.iter();
+        let joints: Vec<String> = joints.map(|joint| joint.name.clone()).collect();
+        let objects = self.scene.objects.iter();
+        let objects: Vec<String> = objects.map(|object| object.id.clone()).collect();
+        let text = mjcf::write(&self.run, &self.robot, &self.scene, start);
+        self.link.begin(&text, &joints, &objects, start.tick_secs)
+    }
+
+    fn tick(&mut self, setpoints: &[Setpoint]) -> Result<EngineState, String> {
+        self.link.tick(setpoints)
+    }
+}
+
 /// Simulates a stored run again, and returns the files with which another engine plays it.
 ///
 /// # Errors
@@ -61,35 +108,118 @@ pub fn playable(
     detail: &RunDetail,
     context: &RunContext,
 ) -> Result<PlayableRun, Diagnostics> {
-    if env.robot.profile.hand.suction.is_some() {
-        let message = format!(
-            "run {} can't be written as MJCF: its robot holds things by a suction cup, whose seal MuJoCo does not have",
-            detail.row.run
-        );
-        let help = "runs of robots with fingers can be written";
-        return Err(Diagnostic::error("S053", message).help(help).into());
-    }
-    let (choices, was) = history.traces().recorded(&detail.row.run)?;
-    let index = env.index_of(&detail.row.test, &choices)?;
-    let attempt = Attempt {
-        campaign: &record.id,
-        index,
-        choices: &|| Choices::recorded(&choices),
-        cut: cut_secs(&was).map_or(Cut::Never, |at_secs| Cut::Simulated { at_secs }),
-    };
-    let mut playback = None;
-    let run = attempt
-        .make_played(env, context, Some(&mut playback))
-        .map_err(|why| refused(detail, &why.to_string()))?;
-    let Some(playback) = playback else {
-        return Err(refused(detail, "its scene could not be simulated").into());
-    };
-    if run.trace.hash != was.hash {
+    let stored = Stored::of(history, env, detail)?;
+    let choices = || Choices::recorded(&stored.choices);
+    let (run, playback) = stored.make((env, &record.id), &choices, context, None)?;
+    if run.trace.hash != stored.was.hash {
         let why = "it now has other states: a model, the configuration or the program changed";
         let help =
             "`actcheck replay RUN` names the first difference; a run made today can be written";
         return Err(refused(detail, why).help(help).into());
     }
+    Ok(played(env, &record.id, &detail.row.run, run, &playback))
+}
+
+/// Runs the scene of a stored run in another engine: the skill gets that engine's observations.
+/// Returns the files with which the engine plays the same run again, to record it.
+///
+/// # Errors
+/// As [`playable`], or the engine can't go on (`S041`).
+pub fn played_in(
+    history: &History,
+    (env, record): &StoredCampaign,
+    detail: &RunDetail,
+    context: &RunContext,
+    link: Box<dyn EngineLink>,
+) -> Result<PlayableRun, Diagnostics> {
+    let stored = Stored::of(history, env, detail)?;
+    // What only happens in the other engine is drawn anew.
+    let (seed, index) = (detail.seed, detail.row.index);
+    let choices = || Choices::partly_recorded(&stored.choices, seed, index);
+    let scene = scenario::draw(&env.space, env.test_of(stored.index), &mut choices())
+        .map_err(|why| refused(detail, &why.to_string()))?;
+    let engine = Handed {
+        run: detail.row.run.clone(),
+        robot: env.robot.clone(),
+        scene,
+        link,
+    };
+    let engine: Box<dyn OtherEngine> = Box::new(engine);
+    let (run, playback) = stored.make((env, &record.id), &choices, context, Some(engine))?;
+    if run.status == RunStatus::Broken {
+        let why = run.reason.as_deref().unwrap_or("it broke");
+        return Err(refused(detail, why).into());
+    }
+    let mut played = played(env, &record.id, &detail.row.run, run, &playback);
+    // The report is the one that the skill gave in that engine.
+    played
+        .actions
+        .iter_mut()
+        .for_each(|action| action.holds = false);
+    Ok(played)
+}
+
+/// A stored run to make again.
+struct Stored<'a> {
+    detail: &'a RunDetail,
+    /// An index of its test.
+    index: u64,
+    choices: Vec<Choice>,
+    was: Trace,
+}
+
+impl<'a> Stored<'a> {
+    fn of(history: &History, env: &Env, detail: &'a RunDetail) -> Result<Self, Diagnostics> {
+        if env.robot.profile.hand.suction.is_some() {
+            let message = format!(
+                "run {} can't be written as MJCF: its robot holds things by a suction cup, whose seal MuJoCo does not have",
+                detail.row.run
+            );
+            let help = "runs of robots with fingers can be written";
+            return Err(Diagnostic::error("S053", message).help(help).into());
+        }
+        let (choices, was) = history.traces().recorded(&detail.row.run)?;
+        Ok(Self {
+            detail,
+            index: env.index_of(&detail.row.test, &choices)?,
+            choices,
+            was,
+        })
+    }
+
+    /// Makes the run, and takes the robot's part.
+    fn make(
+        &self,
+        (env, campaign): (&Env, &str),
+        choices: &dyn Fn() -> Choices,
+        context: &RunContext,
+        engine: Option<Box<dyn OtherEngine>>,
+    ) -> Result<(FinishedRun, Playback), Diagnostics> {
+        let attempt = Attempt {
+            campaign,
+            index: self.index,
+            choices,
+            cut: cut_secs(&self.was).map_or(Cut::Never, |at_secs| Cut::Simulated { at_secs }),
+        };
+        let mut playback = None;
+        let run = attempt
+            .make_played(env, context, Some(&mut playback), engine)
+            .map_err(|why| refused(self.detail, &why.to_string()))?;
+        match playback {
+            Some(playback) => Ok((run, playback)),
+            None => Err(refused(self.detail, "its scene could not be simulated").into()),
+        }
+    }
+}
+
+/// A run with the files for the engine that plays it.
+fn played(
+    env: &Env,
+    campaign: &str,
+    id: &str,
+    run: FinishedRun,
+    playback: &Playback,
+) -> PlayableRun {
     let links = &env.robot.model.links;
     let name = |link: &usize| format!("robot/{}", links[*link].name);
     let base = env
@@ -98,10 +228,10 @@ pub fn playable(
         .layout
         .base
         .map_or(0, |[.., heading]| heading + 1);
-    Ok(PlayableRun {
+    PlayableRun {
         files: Playable {
-            mjcf: mjcf::write(&detail.row.run, &env.robot, &run.scene, &playback),
-            setpoints: setpoints::write(&env.robot, &playback),
+            mjcf: mjcf::write(id, &env.robot, &run.scene, playback),
+            setpoints: setpoints::write(&env.robot, playback),
         },
         actions: played_actions(&run.trace),
         fingers: env
@@ -111,8 +241,8 @@ pub fn playable(
             .each_ref()
             .map(|finger| finger.iter().map(name).collect()),
         base: name(&base),
-        record: performed_only(run.into_record(RunPlace::alone(&record.id))),
-    })
+        record: performed_only(run.into_record(RunPlace::alone(campaign))),
+    }
 }
 
 /// Leaves out the actions that were not performed: another engine does not play them, and both

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use clap::Args;
@@ -9,6 +10,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
+use crate::mujoco_link::MujocoPool;
 use crate::options::{Format, HistoryArgs};
 use crate::python::{PythonModule, new_scratch};
 use crate::work::{all_cores, quietly};
@@ -16,8 +18,8 @@ use crate::{clock, history_dir, output, trust};
 use actcheck_analysis::{EngineComparison, RunInEngines};
 use actcheck_base::{Below, Diagnostic, Diagnostics};
 use actcheck_campaign::{
-    Env, EpisodeFile, ImportOptions, PlayableRun, RuleSet, RunContext, import, judge_played,
-    mapping_of, on_workers, playable, rules_of,
+    Env, EpisodeFile, ImportOptions, PlayableRun, RuleSet, RunContext, StoredCampaign, import,
+    judge_played, mapping_of, on_workers, playable, played_in, rules_of,
 };
 use actcheck_episodes::Mapping;
 use actcheck_history::{History, RunDetail, RunFilter, RunRecord, RunStatus};
@@ -42,6 +44,9 @@ pub struct CrossCheckArgs {
     /// Make the friction of the fingers wrong by this factor in MuJoCo, to see whether it is found
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = factor)]
     pub finger_friction: f64,
+    /// Run the scenes in MuJoCo anew: the skill gets MuJoCo's observations and reacts to them
+    #[arg(long, conflicts_with = "finger_friction")]
+    pub closed_loop: bool,
     /// Number of workers; does not affect results [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub jobs: Option<u16>,
@@ -95,8 +100,17 @@ struct Played {
 /// A run with its mapping and its records, by setting.
 struct Checked {
     here: PlayableRun,
+    /// The run whose setpoints MuJoCo plays, if it is not the one here.
+    made_there: Option<PlayableRun>,
     mapping: Mapping,
     there: BTreeMap<String, RunRecord>,
+}
+
+impl Checked {
+    /// The run whose setpoints MuJoCo plays.
+    fn played(&self) -> &PlayableRun {
+        self.made_there.as_ref().unwrap_or(&self.here)
+    }
 }
 
 /// Plays runs of a campaign in MuJoCo and compares the verdicts. Returns the exit code.
@@ -137,11 +151,28 @@ pub fn cross_check(args: &CrossCheckArgs) -> Result<u8, Diagnostics> {
         return Err(faults);
     }
     let scratch = new_scratch()?;
-    write(&runs, &scratch.path().join("runs"))?;
+    let again = if args.closed_loop {
+        let pool = MujocoPool::new(&args.python, scratch.path(), NEEDS);
+        made_in_mujoco(
+            &history,
+            &recalled,
+            (runs, &details),
+            &pool,
+            jobs,
+            &mut faults,
+        )?
+    } else {
+        runs.into_iter().map(|run| (run, None)).collect()
+    };
+    let there: Vec<&PlayableRun> = again
+        .iter()
+        .map(|(here, there)| there.as_ref().unwrap_or(here))
+        .collect();
+    write(&there, &scratch.path().join("runs"))?;
     let mut played = play(args, scratch.path())?;
     faults.extend(std::mem::take(&mut played.faults));
     let rules = rules_of(&recalled.0)?;
-    let mut checked = judged(runs, &played, &rules, (jobs, &args.campaign), &mut faults)?;
+    let mut checked = judged(again, &played, &rules, (jobs, &args.campaign), &mut faults)?;
     checked.retain(|run| run.there.contains_key(PLAIN));
     if checked.is_empty() {
         return Err(faults);
@@ -173,6 +204,40 @@ pub fn cross_check(args: &CrossCheckArgs) -> Result<u8, Diagnostics> {
     }
     output::print_diagnostics(&faults);
     Ok(2)
+}
+
+/// Runs the scenes in MuJoCo. Each run comes with the one there; runs that can't be made there are
+/// left out.
+fn made_in_mujoco(
+    history: &History,
+    recalled: &StoredCampaign,
+    (runs, details): (Vec<PlayableRun>, &[RunDetail]),
+    pool: &Arc<MujocoPool>,
+    jobs: usize,
+    faults: &mut Diagnostics,
+) -> Result<Vec<(PlayableRun, Option<PlayableRun>)>, Diagnostics> {
+    let context = RunContext {
+        clock: clock::system(),
+        disturb: None,
+    };
+    let is_made = |detail: &&RunDetail| runs.iter().any(|run| run.record.id == detail.row.run);
+    let details: Vec<&RunDetail> = details.iter().filter(is_made).collect();
+    let made = quietly(|| {
+        on_workers(jobs, &details, |detail| {
+            played_in(history, recalled, detail, &context, pool.link())
+        })
+    })?;
+    let mut again = Vec::new();
+    for ((here, detail), there) in runs.into_iter().zip(&details).zip(made) {
+        match there {
+            Ok(mut there) => {
+                there.record.id.clone_from(&detail.row.run);
+                again.push((here, Some(there)));
+            }
+            Err(found) => faults.extend(found),
+        }
+    }
+    Ok(again)
 }
 
 /// The first runs of the campaign that completed.
@@ -208,7 +273,7 @@ fn chosen(history: &History, args: &CrossCheckArgs) -> Result<Vec<RunDetail>, Di
 }
 
 /// Writes the files for the player, a folder for each run.
-fn write(runs: &[PlayableRun], folder: &Path) -> Result<(), Diagnostics> {
+fn write(runs: &[&PlayableRun], folder: &Path) -> Result<(), Diagnostics> {
     let below = Below::new(folder);
     for run in runs {
         let own = folder.join(&run.record.id);
@@ -258,11 +323,15 @@ fn play(args: &CrossCheckArgs, scratch: &Path) -> Result<Played, Diagnostics> {
         scratch,
     };
     let (runs, friction) = (scratch.join("runs"), args.finger_friction.to_string());
-    let arguments = [
+    let mut arguments = vec![
         runs.as_os_str(),
         "--finger-friction".as_ref(),
         friction.as_ref(),
     ];
+    if args.closed_loop {
+        // The setpoints are the skill's answers to MuJoCo as it is.
+        arguments.push("--plain".as_ref());
+    }
     let mut played = Played::default();
     let end = module.run(&arguments, |line| played.add(line))?;
     if end.is_crash() {
@@ -304,17 +373,18 @@ impl Played {
 
 /// Judges all recordings by the present rules.
 fn judged(
-    runs: Vec<PlayableRun>,
+    runs: Vec<(PlayableRun, Option<PlayableRun>)>,
     played: &Played,
     rules: &RuleSet,
     (jobs, campaign): (usize, &str),
     faults: &mut Diagnostics,
 ) -> Result<Vec<Checked>, Diagnostics> {
     let mut checked = Vec::new();
-    for here in runs {
+    for (here, made_there) in runs {
         let mapping = mapping_of(&here, campaign)?;
         checked.push(Checked {
             here,
+            made_there,
             mapping,
             there: BTreeMap::new(),
         });
@@ -331,7 +401,7 @@ fn judged(
         .collect();
     let records = on_workers(jobs, &all, |(number, _, path)| {
         let run = &checked[*number];
-        judge_played(path, &run.mapping, rules, &run.here.record)
+        judge_played(path, &run.mapping, rules, &run.played().record)
     })?;
     for ((number, setting, _), record) in all.into_iter().zip(records) {
         match record {
@@ -360,7 +430,7 @@ fn stored(
                 named: format!("{id} in MuJoCo {}", played.version),
                 mapping: &run.mapping,
                 rules,
-                repeats: Some(&run.here.record.trace),
+                repeats: Some(&run.played().record.trace),
             })
         })
         .collect();

@@ -45,6 +45,7 @@ mod live_failures;
 mod man;
 mod margin_bounds;
 mod merge;
+mod mujoco_link;
 mod named_queries;
 mod new;
 mod new_campaign;

@@ -2,11 +2,12 @@
 //! this program does not.
 
 use std::ffi::OsStr;
-use std::io::{BufRead as _, BufReader, Read as _};
+use std::io::{BufRead as _, BufReader, BufWriter, Read as _, Write as _};
 use std::path::Path;
-use std::process::{Command, ExitStatus, Stdio};
+use std::process::{Child, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
 
 use serde::de::DeserializeOwned;
+use serde_json::Value;
 
 use actcheck_base::{Below, Diagnostic, Diagnostics, ScratchFolder};
 
@@ -54,11 +55,8 @@ impl PythonModule<'_> {
                 self.needs
             ))
         };
-        let mut child = Command::new(self.python)
-            .args(["-m", self.name])
-            .args(arguments)
-            .env("PYTHONPATH", self.scratch.join("python"))
-            .env("PYTHONDONTWRITEBYTECODE", "1")
+        let mut child = self
+            .command(arguments)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -144,4 +142,81 @@ fn unpack(folder: &Path) -> Result<(), Diagnostics> {
         })?;
     }
     Ok(())
+}
+
+/// A module of the package that answers requests, one JSON value in each line.
+pub(super) struct PythonTalk {
+    child: Child,
+    requests: BufWriter<ChildStdin>,
+    answers: BufReader<ChildStdout>,
+}
+
+impl PythonModule<'_> {
+    /// Starts a module that answers requests.
+    ///
+    /// # Errors
+    /// Why it can't be started, in words.
+    pub(super) fn talk(&self, arguments: &[&OsStr]) -> Result<PythonTalk, String> {
+        let why = |error: std::io::Error| {
+            format!(
+                "can't start `{}`: {error}; name a Python with {}",
+                self.python.display(),
+                self.needs
+            )
+        };
+        let mut child = self
+            .command(arguments)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::inherit())
+            .spawn()
+            .map_err(why)?;
+        match (child.stdin.take(), child.stdout.take()) {
+            (Some(requests), Some(answers)) => Ok(PythonTalk {
+                child,
+                requests: BufWriter::new(requests),
+                answers: BufReader::new(answers),
+            }),
+            _ => Err("it has no input or output".to_owned()),
+        }
+    }
+
+    fn command(&self, arguments: &[&OsStr]) -> Command {
+        let mut command = Command::new(self.python);
+        command
+            .args(["-m", self.name])
+            .args(arguments)
+            .env("PYTHONPATH", self.scratch.join("python"))
+            .env("PYTHONDONTWRITEBYTECODE", "1");
+        command
+    }
+}
+
+impl PythonTalk {
+    /// Asks for something.
+    ///
+    /// # Errors
+    /// The module ended, or did not answer as expected, in words.
+    pub(super) fn ask<A: DeserializeOwned>(&mut self, request: &Value) -> Result<A, String> {
+        let ended = |error: std::io::Error| format!("it ended: {error}");
+        writeln!(self.requests, "{request}").map_err(ended)?;
+        self.requests.flush().map_err(ended)?;
+        let mut line = String::new();
+        match self.answers.read_line(&mut line) {
+            Ok(0) => Err("it ended".to_owned()),
+            Ok(_) => serde_json::from_str(&line).map_err(|error| {
+                let said: String = line.trim().chars().take(200).collect();
+                format!("it answered `{said}`: {error}")
+            }),
+            Err(error) => Err(ended(error)),
+        }
+    }
+}
+
+impl Drop for PythonTalk {
+    fn drop(&mut self) {
+        // It ends with its input, too; a simulator that hangs must not outlive this program.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
 }

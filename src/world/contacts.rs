@@ -56,6 +56,22 @@ impl Touch {
             strongest_n: normal_n,
         }
     }
+
+    /// This touch together with another one of the same bodies.
+    pub(super) fn with(&self, other: &Self) -> Self {
+        let strongest = if other.strongest_n > self.strongest_n {
+            other
+        } else {
+            self
+        };
+        Self {
+            normal_n: self.normal_n + other.normal_n,
+            depth_m: self.depth_m.max(other.depth_m),
+            force_n: self.force_n + other.force_n,
+            point_m: strongest.point_m,
+            strongest_n: strongest.strongest_n,
+        }
+    }
 }
 
 /// Largest force of contacts on a hand that the engine moves alone: a loaded arm gives way. Unit:

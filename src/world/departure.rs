@@ -58,6 +58,11 @@ impl Departures {
         self.fault = Some(Fault::Joint(joint));
     }
 
+    /// Notes why another engine can't go on, which is a fault.
+    pub(super) fn other_engine_failed(&mut self, why: String) {
+        self.fault = Some(Fault::OtherEngine(why));
+    }
+
     /// Notes the words of a panic in the engine, which are a fault.
     pub(super) fn engine_panicked(&mut self, words: String) {
         self.panicked = Some(words);

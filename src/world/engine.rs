@@ -17,8 +17,10 @@ use crate::furniture::Furniture;
 use crate::hollows;
 use crate::link_pairs::{LinkPairs, prepare_contacts};
 use crate::object::{self, Object};
+use crate::other_engine::{OtherEngine, Puppeteer};
 use crate::patches::Patches;
 use crate::physics::{add_floor, engine};
+use crate::playback::Playback;
 use crate::proximity::Proximity;
 use crate::reach::Reach;
 use crate::robot::SimulatedRobot;
@@ -38,6 +40,8 @@ pub struct Engine {
     link_pairs: LinkPairs,
     patches: Patches,
     watch: Watch,
+    /// Another engine, which steps the bodies instead.
+    puppeteer: Option<Puppeteer>,
 }
 
 impl Engine {
@@ -85,6 +89,7 @@ impl Engine {
             link_pairs,
             patches: Patches::default(),
             watch: Watch::default(),
+            puppeteer: None,
         })
     }
 
@@ -121,6 +126,9 @@ impl Engine {
 
     /// Returns all contacts and the seal of a suction cup, by ordered pair of owners.
     pub(super) fn touches(&self) -> Touches {
+        if let Some(puppeteer) = &self.puppeteer {
+            return puppeteer.touches().clone();
+        }
         let seal = self.cup.as_ref().and_then(|cup| cup.touch(&self.bodies));
         contacts::touches(&self.bodies, seal)
     }
@@ -160,11 +168,25 @@ impl Engine {
         }
     }
 
+    /// Lets another engine step the bodies from now on.
+    pub(super) fn move_by(&mut self, engine: Box<dyn OtherEngine>, start: &Playback) {
+        match Puppeteer::begin(engine, &mut self.bodies, start) {
+            Ok(puppeteer) => self.puppeteer = Some(puppeteer),
+            Err(why) => self.departures.other_engine_failed(why),
+        }
+    }
+
     /// Performs the steps of a control tick, unless there is a fault. Returns whether the tick
     /// ended without one.
     pub(super) fn tick(&mut self, proximity: &mut Proximity) -> bool {
         if self.fault().is_some() {
             return false;
+        }
+        if let Some(puppeteer) = &mut self.puppeteer {
+            if let Err(why) = puppeteer.tick(&mut self.bodies) {
+                self.departures.other_engine_failed(why);
+            }
+            return self.fault().is_none();
         }
         if let Some(cup) = &mut self.cup {
             cup.seal_surface(&mut self.bodies);
@@ -273,6 +295,9 @@ impl Engine {
     /// Takes the contacts after a tick into account: objects that the robot moves may leave the
     /// world, and furniture that it pushes slides.
     pub(super) fn end_tick(&mut self, touches: &Touches) {
+        if self.puppeteer.is_some() {
+            return;
+        }
         self.departures.record(&self.bodies, touches);
         self.furniture.move_pushed(&mut self.bodies, touches);
     }

@@ -28,6 +28,8 @@ pub enum Fault {
     Joint(String),
     /// The physics engine panicked, with these words.
     Engine(String),
+    /// Another physics engine, which moved the bodies instead, can't go on.
+    OtherEngine(String),
 }
 
 impl fmt::Display for Fault {
@@ -45,6 +47,7 @@ impl fmt::Display for Fault {
                 "the state or a limit of the joint {name} is not a valid number"
             ),
             Self::Engine(words) => write!(f, "a fault in the physics engine: {words}"),
+            Self::OtherEngine(why) => write!(f, "the other physics engine can't go on: {why}"),
         }
     }
 }

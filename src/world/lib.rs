@@ -34,6 +34,7 @@ mod motor_law;
 mod object;
 mod observe;
 mod odometry;
+mod other_engine;
 mod overlaps;
 mod ownership;
 mod patches;
@@ -61,6 +62,7 @@ pub use engine::Engine;
 pub use error::WorldError;
 pub use fault::{Fault, Perturbation, Poison};
 pub use fresh::narrow_phase;
+pub use other_engine::{EngineContact, EngineState, MovedObject, OtherEngine};
 pub use overlaps::Overlap;
 pub use playback::{MotorGains, Playback, PlayedObject, PrincipalInertia, Setpoint, Surfaces};
 pub use proximity::Proximity;
@@ -68,7 +70,7 @@ pub use reach::Shortcuts;
 pub use recorder::{Contact, Course, Record, Recorder, Tracks};
 pub use sense::Sighting;
 pub use settle::Settling;
-pub use simulation::{World, build, build_with, keep_playback};
+pub use simulation::{World, build, build_with, keep_playback, move_by};
 pub use suction::would_seal;
 
 pub use actcheck_geometry::{

@@ -111,7 +111,7 @@ impl Motor {
         }
     }
 
-    fn setpoint(&self) -> Setpoint {
+    pub(super) fn setpoint(&self) -> Setpoint {
         Setpoint {
             position: self.setpoint,
             velocity: self.setpoint_velocity,

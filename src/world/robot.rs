@@ -10,7 +10,9 @@ use crate::effective_mass::{CARRIED_SHARE, LIGHT_KG, least_effective_mass_kg};
 use crate::free_motion::Equations;
 use crate::motor::Motor;
 use crate::motor_law::{Law, State};
+use crate::other_engine::EngineState;
 use crate::ownership::{Hand, Ownership};
+use crate::playback::Setpoint;
 use crate::{Kinematics, WorldError};
 use actcheck_data::{JointState, RobotProfile, RobotStart};
 use actcheck_geometry::Ball;
@@ -310,6 +312,29 @@ impl SimulatedRobot {
             !is_valid(motor, joint, **position, **velocity)
         });
         found.map(|((_, joint), _)| joint.name.as_str())
+    }
+
+    /// Moves the setpoints by a whole control tick, and returns them, for another engine.
+    pub fn next_setpoints(&mut self, tick_secs: f64) -> Vec<Setpoint> {
+        for motor in &mut self.motors {
+            if motor.push.is_none() {
+                let largest = motor.fastest * tick_secs;
+                let change = (motor.target - motor.setpoint).clamp(-largest, largest);
+                motor.setpoint += change;
+                motor.setpoint_velocity = change / tick_secs;
+            }
+        }
+        self.motors.iter().map(Motor::setpoint).collect()
+    }
+
+    /// Takes the state that another engine gives it, and moves its links there.
+    pub fn follow(&mut self, engine: &mut PhysicsWorld, state: &EngineState) {
+        self.positions.clone_from(&state.positions);
+        self.velocities.clone_from(&state.velocities);
+        for (motor, load) in self.motors.iter_mut().zip(&state.loads) {
+            motor.effort = *load;
+        }
+        self.place_links(engine);
     }
 
     /// Steps the joint controllers: setpoints approach the targets evenly over the `steps_left` of

@@ -17,6 +17,7 @@ use crate::drive::{Command, Drive, Observation};
 use crate::engine::Engine;
 use crate::forms::forms;
 use crate::observe::snapshot;
+use crate::other_engine::OtherEngine;
 use crate::overlaps::{Overlap, overlaps};
 use crate::perturbation;
 use crate::proximity::Proximity;
@@ -69,6 +70,15 @@ pub fn build_with(scene: &Scene, robot: &Robot) -> Result<World, WorldError> {
 /// Starts a playback for another engine at the present state: see [`Recorder::playback`].
 pub fn keep_playback(world: &mut World) {
     world.recorder.keep_playback(&world.engine);
+}
+
+/// Lets another engine step the bodies from now on, and starts the playback of its run. An engine
+/// that can't begin is a fault.
+pub fn move_by(world: &mut World, engine: Box<dyn OtherEngine>) {
+    keep_playback(world);
+    if let Some(start) = world.recorder.playback() {
+        world.engine.move_by(engine, start);
+    }
 }
 
 impl World {

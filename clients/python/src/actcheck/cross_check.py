@@ -29,6 +29,8 @@ _NOSLIP = 5
 #: Factor on the friction of the fingers in the setting `finger-friction`.
 _GRIP = 1.1
 _PYRAMIDAL = 0
+#: One number for each joint.
+Row = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -108,18 +110,24 @@ def _settings(mujoco: Any, finger_friction: float) -> dict[str, Callable[[Any, R
     return settings | {"finger-friction": both(grip(1 / finger_friction))}
 
 
+def _data(mujoco: Any, model: Any) -> Any:
+    """The state of a model at its start."""
+    sleep = getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", None)
+    if sleep is not None:
+        model.opt.enableflags |= int(sleep)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    return data
+
+
 def play(run: Run, change: Callable[[Any, Run], None], to: Path) -> float:
     """Plays a run and records it. Returns the CPU time of the simulation. Unit: seconds."""
     import mujoco
 
     model = mujoco.MjModel.from_xml_path(str(run.folder / "scene.xml"))
     change(model, run)
-    sleep = getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", None)
-    if sleep is not None:
-        model.opt.enableflags |= int(sleep)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    motors = _Motors(mujoco, model, run)
+    data = _data(mujoco, model)
+    motors = _Motors(mujoco, model, run.joints)
     steps = max(1, round(run.tick_s / model.opt.timestep))
     began = time.process_time()
     with record(model, data, to) as recorder:
@@ -130,8 +138,9 @@ def play(run: Run, change: Callable[[Any, Run], None], to: Path) -> float:
             _mark(recorder, run, tick, grips)
             if tick == len(run.position):
                 break
+            motors.begin_tick(run.position[tick], run.velocity[tick], run.limit[tick], run.effort[tick])
             for step in range(steps):
-                motors.drive(data, tick, (step + 1) / steps)
+                motors.drive(data, (step + 1) / steps)
                 mujoco.mj_step(model, data)
             grips.look(data)
             recorder.step()
@@ -161,32 +170,36 @@ def _mark_end(recorder: Recorder, action: dict[str, Any], grips: _Grips) -> None
 class _Motors:
     """The motors of a robot, which follow setpoints."""
 
-    def __init__(self, mujoco: Any, model: Any, run: Run) -> None:
-        found = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, f"robot/{name}") for name in run.joints]
-        self._model, self._run = model, run
-        self._columns = np.array([column for column, motor in enumerate(found) if motor >= 0], dtype=int)
-        self._motors = np.array([motor for motor in found if motor >= 0], dtype=int)
-        stiffness, damping = model.actuator_gainprm[self._motors, 0], -model.actuator_biasprm[self._motors, 2]
+    def __init__(self, mujoco: Any, model: Any, joints: list[str]) -> None:
+        found = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, f"robot/{name}") for name in joints]
+        self._model = model
+        self.columns = np.array([column for column, motor in enumerate(found) if motor >= 0], dtype=int)
+        self.motors = np.array([motor for motor in found if motor >= 0], dtype=int)
+        stiffness, damping = model.actuator_gainprm[self.motors, 0], -model.actuator_biasprm[self.motors, 2]
         self._lead_s = damping / stiffness
-        joints = model.actuator_trnid[self._motors, 0]
-        self._positions, self._speeds = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+        ids = model.actuator_trnid[self.motors, 0]
+        self._positions, self._speeds = model.jnt_qposadr[ids], model.jnt_dofadr[ids]
         self._stiffness, self._damping = stiffness, damping
-        self._start = model.qpos0[self._positions]
+        self._last = self._target = model.qpos0[self._positions]
+        self._tick = (self._target, self._target, self._target)
 
-    def drive(self, data: Any, tick: int, share: float) -> None:
-        """Sets the controls for a step that ends at this share of a tick."""
-        run, columns = self._run, self._columns
-        last = run.position[tick - 1, columns] if tick else self._start
-        target = last + (run.position[tick, columns] - last) * share
-        control = target + self._lead_s * run.velocity[tick, columns]
-        limit, effort = run.limit[tick, columns], run.effort[tick, columns]
+    def begin_tick(self, position: Row, velocity: Row, limit: Row, effort: Row) -> None:
+        """Takes the setpoints at the end of a control tick, one for each joint."""
+        self._last, self._target = self._target, position[self.columns]
+        self._tick = (velocity[self.columns], limit[self.columns], effort[self.columns])
+
+    def drive(self, data: Any, share: float) -> None:
+        """Sets the controls for a step that ends at this share of the tick."""
+        velocity, limit, effort = self._tick
+        target = self._last + (self._target - self._last) * share
+        control = target + self._lead_s * velocity
         pushed = np.isfinite(effort)
         if pushed.any():
             # An effort instead of a position: the effort of the motor's law is taken off again.
             own = self._stiffness * data.qpos[self._positions] + self._damping * data.qvel[self._speeds]
             control = np.where(pushed, (effort + own) / self._stiffness, control)
-        self._model.actuator_forcerange[self._motors, 0], self._model.actuator_forcerange[self._motors, 1] = -limit, limit
-        data.ctrl[self._motors] = control
+        self._model.actuator_forcerange[self.motors, 0], self._model.actuator_forcerange[self.motors, 1] = -limit, limit
+        data.ctrl[self.motors] = control
 
 
 class _Grips:
@@ -218,12 +231,102 @@ class _Grips:
         return bool(left & right)
 
 
+class Scene:
+    """A scene that is stepped on request: `python -m actcheck.cross_check --serve`.
+
+    Each line of the input is a request in JSON, and each line of the output its answer: `{"begin": {…}}` loads a scene, `{"tick": [[position,
+    velocity, limit, effort or null], …]}` performs a control tick and returns the state of robot and objects.
+    """
+
+    def __init__(self, mujoco: Any, begin: dict[str, Any]) -> None:
+        self._mujoco = mujoco
+        self._model = model = mujoco.MjModel.from_xml_string(begin["mjcf"])
+        self._data = _data(mujoco, model)
+        self._steps = max(1, round(begin["tick_s"] / model.opt.timestep))
+        self._motors = _Motors(mujoco, model, begin["joints"])
+        joints = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, f"robot/{name}") for name in begin["joints"]]
+        missing = [name for name, found in zip(begin["joints"], joints, strict=True) if found < 0]
+        if missing:
+            raise ValueError(f"MuJoCo's model has no joint {missing[0]}")
+        self._positions, self._speeds = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+        self._objects = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) for name in begin["objects"]]
+        self._names = [model.body(body).name if body else "floor" for body in range(model.nbody)]
+
+    def tick(self, setpoints: list[list[float | None]]) -> dict[str, Any]:
+        """Performs a control tick, and returns the state after it."""
+        data, motors = self._data, self._motors
+        rows = np.array(setpoints, dtype=float).reshape(-1, 4)
+        motors.begin_tick(*(rows[:, column] for column in range(4)))
+        for step in range(self._steps):
+            motors.drive(data, (step + 1) / self._steps)
+            self._mujoco.mj_step(self._model, data)
+        loads = np.zeros(len(self._positions))
+        loads[motors.columns] = data.actuator_force[motors.motors]
+        return {
+            "positions": data.qpos[self._positions].tolist(),
+            "velocities": data.qvel[self._speeds].tolist(),
+            "loads": loads.tolist(),
+            "objects": [self._object(body) for body in self._objects],
+            "contacts": [self._contact(number) for number in range(data.ncon)],
+        }
+
+    def _object(self, body: int) -> list[float]:
+        """Position, rotation as x, y, z, w, linear and angular velocity; none of a thing that MuJoCo does not have."""
+        if body < 0:
+            return []
+        w, x, y, z = self._data.xquat[body]
+        velocity = np.zeros(6)
+        self._mujoco.mj_objectVelocity(self._model, self._data, self._mujoco.mjtObj.mjOBJ_BODY, body, velocity, 0)
+        return [*self._data.xpos[body].tolist(), float(x), float(y), float(z), float(w), *velocity[3:].tolist(), *velocity[:3].tolist()]
+
+    def _contact(self, number: int) -> list[Any]:
+        """The names of both bodies, the normal force, the force on the second one, and the point."""
+        contact = self._data.contact[number]
+        names = [self._names[self._model.geom_bodyid[geom]] for geom in contact.geom]
+        force = np.zeros(6)
+        self._mujoco.mj_contactForce(self._model, self._data, number, force)
+        on_second = contact.frame.reshape(3, 3).T @ force[:3]
+        return [*names, float(force[0]), on_second.tolist(), contact.pos.tolist()]
+
+
+def serve() -> int:
+    """Answers requests until the input ends."""
+    try:
+        import mujoco
+    except ImportError:
+        mujoco = None
+    scene: Scene | None = None
+    for line in sys.stdin:
+        request = json.loads(line)
+        try:
+            if mujoco is None:
+                raise ValueError("the package `mujoco` is missing: pip install mujoco")
+            if "begin" in request:
+                scene = Scene(mujoco, request["begin"])
+                answer: dict[str, Any] = {"engine_version": str(mujoco.__version__)}
+            elif scene is None:
+                raise ValueError("no scene was loaded")
+            else:
+                answer = scene.tick(request["tick"])
+        except (ValueError, KeyError) as fault:
+            answer = {"reason": str(fault)}
+        print(json.dumps(answer), flush=True)
+    return 0
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Runs the command. Returns 0 if every run was played, 1 if one was not."""
-    parser = argparse.ArgumentParser(prog="python -m actcheck.cross_check", description="Plays runs of actcheck in MuJoCo, open loop.")
-    parser.add_argument("folder", type=Path, help="a folder with a folder for each run")
+    parser = argparse.ArgumentParser(prog="python -m actcheck.cross_check", description="Plays runs of actcheck in MuJoCo.")
+    parser.add_argument("folder", type=Path, nargs="?", help="a folder with a folder for each run, which are played open loop")
+    parser.add_argument("--plain", action="store_true", help="plays runs in the setting of their files alone")
+    parser.add_argument("--serve", action="store_true", help="steps scenes on request instead")
     parser.add_argument("--finger-friction", type=float, default=1.0, metavar="FACTOR", help="makes the friction of the fingers wrong")
-    return print_lines(_lines(parser.parse_args(arguments)))
+    parsed = parser.parse_args(arguments)
+    if parsed.serve:
+        return serve()
+    if parsed.folder is None:
+        parser.error("name a folder, or give --serve")
+    return print_lines(_lines(parsed))
 
 
 def _lines(parsed: argparse.Namespace) -> Iterator[dict[str, Any]]:
@@ -235,7 +338,8 @@ def _lines(parsed: argparse.Namespace) -> Iterator[dict[str, Any]]:
     yield {"engine_version": str(mujoco.__version__)}
     for folder in sorted(path.parent for path in parsed.folder.glob("*/play.json")):
         run = read(folder)
-        for name, change in _settings(mujoco, parsed.finger_friction).items():
+        settings = _settings(mujoco, parsed.finger_friction)
+        for name, change in list(settings.items())[: 1 if parsed.plain else None]:
             to = folder / f"{name}.mcap"
             line: dict[str, Any] = {"run": folder.name, "setting": name}
             try:
