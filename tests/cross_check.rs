@@ -257,6 +257,69 @@ fn runs_are_judged_in_both_engines() {
     assert!(stderr(&again).contains("S054"), "{}", stderr(&again));
 }
 
+/// A skill runs in MuJoCo anew and gets its observations, at one worker and at two alike.
+#[test]
+fn a_skill_runs_in_mujoco_in_a_closed_loop() {
+    let Some(python) = foreign::mujoco() else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let id = campaign(folder.path(), "pick.toml", "6");
+    let python = python.to_str().unwrap();
+    let check = |jobs: &str| {
+        let arguments = [
+            "cross-check",
+            &id,
+            "--closed-loop",
+            "--python",
+            python,
+            "--history",
+            "h",
+            "--jobs",
+            jobs,
+            "--format",
+            "json",
+        ];
+        let checked = actcheck(folder.path(), &arguments);
+        let found: Value = serde_json::from_str(&stdout(&checked))
+            .unwrap_or_else(|_| panic!("{}", stderr(&checked)));
+        found
+    };
+    let [one, two] = ["1", "2"].map(check);
+    assert_eq!(one["runs"], two["runs"]);
+    assert_eq!(one["all_properties"]["of"], 6, "{one:#}");
+    assert!(
+        one["all_properties"]["agree"].as_u64().unwrap() >= 4,
+        "{one:#}"
+    );
+    assert_eq!(one["settings"].as_array().unwrap().len(), 1, "{one:#}");
+}
+
+/// A whole task in MuJoCo: preconditions are decided by its contacts.
+#[test]
+fn a_whole_task_runs_in_mujoco_in_a_closed_loop() {
+    let Some(python) = foreign::mujoco() else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let id = campaign(folder.path(), "pick_and_place.toml", "1");
+    let arguments = [
+        "cross-check",
+        &id,
+        "--closed-loop",
+        "--python",
+        python.to_str().unwrap(),
+        "--history",
+        "h",
+        "--format",
+        "json",
+    ];
+    let checked = actcheck(folder.path(), &arguments);
+    let found: Value =
+        serde_json::from_str(&stdout(&checked)).unwrap_or_else(|_| panic!("{}", stderr(&checked)));
+    assert_eq!(found["all_properties"]["of"], 1, "{found:#}");
+}
+
 /// Without MuJoCo the command says so, and nothing is stored.
 #[test]
 fn a_python_without_mujoco_is_named() {
@@ -278,6 +341,22 @@ fn a_python_without_mujoco_is_named() {
         stderr(&refused).contains("no-such-python"),
         "{}",
         stderr(&refused)
+    );
+    let arguments = [
+        "cross-check",
+        &id,
+        "--closed-loop",
+        "--python",
+        "no-such-python",
+        "--history",
+        "h",
+    ];
+    let refused = actcheck(folder.path(), &arguments);
+    assert_eq!(refused.status.code(), Some(2));
+    let said = stderr(&refused);
+    assert!(
+        said.contains("no-such-python") && said.contains("pip install"),
+        "{said}"
     );
     let history = History::open_to_read(&folder.path().join("h")).unwrap();
     assert_eq!(history.campaigns().unwrap().len(), 1);

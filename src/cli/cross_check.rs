@@ -153,14 +153,13 @@ pub fn cross_check(args: &CrossCheckArgs) -> Result<u8, Diagnostics> {
     let scratch = new_scratch()?;
     let again = if args.closed_loop {
         let pool = MujocoPool::new(&args.python, scratch.path(), NEEDS);
-        made_in_mujoco(
-            &history,
-            &recalled,
-            (runs, &details),
-            &pool,
-            jobs,
-            &mut faults,
-        )?
+        let runs = (runs, details.as_slice());
+        let made = made_in_mujoco(&history, &recalled, runs, &pool, jobs, &mut faults)?;
+        if made.is_empty() {
+            // The reason is the same for all.
+            return Err(faults.into_iter().take(1).collect());
+        }
+        made
     } else {
         runs.into_iter().map(|run| (run, None)).collect()
     };

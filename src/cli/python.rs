@@ -159,7 +159,7 @@ impl PythonModule<'_> {
     pub(super) fn talk(&self, arguments: &[&OsStr]) -> Result<PythonTalk, String> {
         let why = |error: std::io::Error| {
             format!(
-                "can't start `{}`: {error}; name a Python with {}",
+                "can't start `{}`: {error}; name a Python with {} (pip install mujoco mcap)",
                 self.python.display(),
                 self.needs
             )
