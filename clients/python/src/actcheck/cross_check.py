@@ -308,7 +308,7 @@ def serve() -> int:
                 raise ValueError("no scene was loaded")
             else:
                 answer = scene.tick(request["tick"])
-        except (ValueError, KeyError) as fault:
+        except (ValueError, KeyError, IndexError) as fault:
             answer = {"reason": str(fault)}
         print(json.dumps(answer), flush=True)
     return 0
