@@ -52,7 +52,8 @@ fn every_shipped_campaign_is_the_same_with_one_and_two_workers() {
             );
             (stdout(&outcomes), stdout(&list))
         });
-        assert!(one.1.lines().count() == 3, "{name}: {}", one.1);
+        // A head, the runs, and those of pairs.
+        assert!(one.1.lines().count() >= 3, "{name}: {}", one.1);
         assert_eq!(one, two, "{name}");
     }
 }
