@@ -56,7 +56,7 @@ fn properties_from_passing_runs_notice_faults_and_are_kept_by_runs_of_another_se
         );
     }
 
-    // The proposed ontology judges fresh runs: what passes there keeps the proposed limits, too.
+    // The proposed ontology judges fresh runs: those that pass keep the proposed limits, too.
     let text = std::fs::read_to_string(&config).unwrap();
     let text = text
         .replace("\"../ontology/actions.ttl\"", "\"proposed/properties.ttl\"")

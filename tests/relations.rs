@@ -98,7 +98,10 @@ fn the_pairs_of_a_campaign_are_the_same_for_any_number_of_workers_and_no_rate_co
         &["relate", id, "--history", "both", "--format", "json"],
     );
     assert_eq!(merged, *found, "the pairs come with their campaign");
-    let page = actcheck(folder.path(), &["report", "--history", "one"]);
+    let page = actcheck(
+        folder.path(),
+        &["report", "--history", "one", "--html", "one.html"],
+    );
     assert!(page.status.success(), "{}", stderr(&page));
 }
 

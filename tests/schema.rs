@@ -29,6 +29,7 @@ nav = { may_block = true }
 skill = { args = ["--slow"], dir = ".", privileged = true, startup_s = 20.0, timeout_s = 5.0, memory_mb = 512, cpu_s = 60, max_broken = 3, env = { SPEED = "0.5" } }
 search = { strategy = "halton" }
 scene = { require = "ROOT/rules/scene/reachable.rls" }
+relations = { mirrored = "ROOT/rules/relations/same_verdicts.rls", more_friction = "ROOT/rules/relations/no_worse.rls", less_mass = "ROOT/rules/relations/no_worse.rls", without_far_object = "ROOT/rules/relations/same_verdicts.rls", renamed = "ROOT/rules/relations/same_verdicts.rls" }
 history = { dir = "h" }
 categories = { glass = "act:Glass" }
 world = { worlds = ["lab", "apartment"] }

@@ -1,11 +1,12 @@
-//! Candidates for properties, mined from passing runs: what each measures, its rules, its values in
-//! stored runs, and the injected faults that it notices.
+//! Candidates for properties, mined from passing runs: their rules, their values in stored runs, and
+//! trials with injected faults.
 //!
 //! A candidate is a rule file with a limit to fill in. With the limit 0, its margin is the value in
 //! a run: candidates are measured by the rules that they become.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
+use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use crate::oracles::{Fault, Trial, TrialOptions, try_faults};
@@ -13,7 +14,7 @@ use crate::rule_set::RuleSet;
 use crate::{Env, judge_stored};
 use actcheck_base::{Diagnostics, Source, names};
 use actcheck_history::{History, RunRow};
-use actcheck_ontology::{Action, Ontology, Property, RuleFile};
+use actcheck_ontology::{self as ontology, Action, Ontology, Property, RuleFile};
 use actcheck_rules::RuleBook;
 
 /// How a value is limited.
@@ -34,7 +35,7 @@ pub struct Candidate {
     pub action: String,
     /// Local name of the property.
     pub name: String,
-    /// What is limited, such as `the largest speed of the object to pick`.
+    /// The limited value, such as `the largest speed of the object to pick`.
     pub measure: String,
     /// Unit of the value; empty for numbers.
     pub unit: &'static str,
@@ -355,7 +356,7 @@ const LAST: &str = "last(#max(?t)) :- course(w:gripper, w:z, ?t, _) .\n";
 /// An event: part of a name, words, and conditions on its start `?s`.
 type Event = (String, String, String);
 
-/// Pairs of events of which one may always be before the other. Two phases are no pair: their
+/// Pairs of events of which one may always be before the other. Pairs of phases are left out: their
 /// order is that of the program.
 fn orders(phases: &BTreeSet<String>) -> Vec<[Event; 2]> {
     let events = [
@@ -529,3 +530,22 @@ pub fn try_candidates(
 
 /// Added to the seed of a campaign for scenes that it does not have.
 const FRESH_SEED: u64 = 1_000_003;
+
+/// Returns the IRI by which an ontology in `folder`, which may be new, imports another one.
+///
+/// # Errors
+/// A folder can't be found.
+pub fn import_from(folder: &Path, root: &Path) -> std::io::Result<String> {
+    let (folder, root) = (std::path::absolute(folder)?, std::fs::canonicalize(root)?);
+    let parent = folder.parent().map(std::fs::canonicalize).transpose();
+    let folder = match (parent, folder.file_name()) {
+        (Ok(Some(parent)), Some(name)) => parent.join(name),
+        _ => folder,
+    };
+    let way = pathdiff::diff_paths(&root, folder).unwrap_or(root);
+    let parts = way.components().map(|part| match part {
+        std::path::Component::ParentDir => "..".to_owned(),
+        part => ontology::encoded(&part.as_os_str().to_string_lossy()),
+    });
+    Ok(parts.collect::<Vec<String>>().join("/"))
+}

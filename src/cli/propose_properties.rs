@@ -16,7 +16,9 @@ use crate::work::{all_cores, quietly};
 use crate::{clock, compare, output, stop, trust, why};
 use actcheck_analysis::{Beyond, MinedLimit, Notice, OracleTrial, oracle_matrix};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Outcome};
-use actcheck_campaign::mining::{Candidate, Side, candidates, measure, phases, try_candidates};
+use actcheck_campaign::mining::{
+    Candidate, Side, candidates, import_from, measure, phases, try_candidates,
+};
 use actcheck_campaign::oracles::{COURSE_FAULTS, FAULTS, Fault, Trial, TrialOptions};
 use actcheck_campaign::{Env, RunContext};
 use actcheck_history::{CampaignRecord, History, RunFilter, RunRow, RunStatus};
@@ -47,7 +49,7 @@ pub struct ProposePropertiesArgs {
     /// Number of fresh scenes for each test in which faults are injected
     #[arg(long, value_name = "N", default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..))]
     pub scenes: u32,
-    /// Propose also those that notice nothing which the present properties don't notice
+    /// Propose also properties whose faults the present properties notice, too
     #[arg(long)]
     pub all: bool,
     /// The folder for the rule files; it must not have them yet
@@ -105,7 +107,7 @@ pub fn propose_properties(args: &ProposePropertiesArgs) -> Result<u8, Diagnostic
         (path, _) => why::ontology_file(path.as_deref()),
     };
     let known = ontology::load(&files, &root)?;
-    let runs = Runs::of(&history, &id, labels.as_deref())?;
+    let runs = GoodAndBad::of(&history, &id, labels.as_deref())?;
     let confirmed = confirmed(&history, &known, &runs, (jobs, &stop))?;
     if stop.load(Ordering::Relaxed) {
         return Ok(stop::INTERRUPTED);
@@ -161,7 +163,7 @@ fn read_labels(path: &Path) -> Result<Vec<Label>, Diagnostics> {
 }
 
 /// The runs of the campaign.
-struct Runs {
+struct GoodAndBad {
     /// Those that passed, and have no bad label.
     good: Vec<RunRow>,
     /// Those with a bad label.
@@ -170,7 +172,7 @@ struct Runs {
     labelled_good: Vec<RunRow>,
 }
 
-impl Runs {
+impl GoodAndBad {
     fn of(history: &History, id: &str, labels: Option<&[Label]>) -> Result<Self, Diagnostics> {
         let filter = RunFilter {
             campaign: Some(id.to_owned()),
@@ -209,7 +211,7 @@ impl Runs {
 fn confirmed(
     history: &History,
     known: &Ontology,
-    runs: &Runs,
+    runs: &GoodAndBad,
     (jobs, stop): (usize, &AtomicBool),
 ) -> Result<Vec<Confirmed>, Diagnostics> {
     let some: Vec<RunRow> = runs.good.iter().take(RUNS_FOR_PHASES).cloned().collect();
@@ -347,18 +349,18 @@ fn write(
     (files, root): (&Files, &Path),
     known: &Ontology,
     proposed: &[Proposed],
-    runs: &Runs,
+    runs: &GoodAndBad,
 ) -> Result<(), Diagnostics> {
     let import = match files {
         Files::Shipped => SHIPPED.to_owned(),
-        Files::Disk => {
-            let path = std::path::absolute(root).unwrap_or_else(|_| root.to_path_buf());
-            format!("file://{}", path.display())
-        }
+        Files::Disk => import_from(&args.output, root).map_err(|error| {
+            let message = format!("can't find the way to {}: {error}", root.display());
+            Diagnostic::error("X007", message).help("name another folder with `--output`")
+        })?,
     };
     let mut text = format!(
         "# Properties that `actcheck propose-properties` proposes from the passing runs of campaign {id}. Read each rule file, and\n\
-         # remove what is not meant. `ontology = \"{ROOT}\"` in a configuration beside this file uses them.\n\n\
+         # remove unwanted ones. `ontology = \"{ROOT}\"` in a configuration beside this file uses them.\n\n\
          @prefix act: <http://actions#> .\n@prefix owl: <http://www.w3.org/2002/07/owl#> .\n\
          @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .\n\n\
          <> a owl:Ontology ; owl:imports <{import}> .\n"
@@ -399,7 +401,7 @@ fn write(
 }
 
 /// The evidence for a property, as sentences for its rule file.
-fn evidence(one: &Proposed, id: &str, runs: &Runs) -> Vec<String> {
+fn evidence(one: &Proposed, id: &str, runs: &GoodAndBad) -> Vec<String> {
     let found = &one.confirmed.found;
     let mut lines = vec![
         format!(
@@ -443,7 +445,7 @@ fn faults_of(one: &Proposed) -> String {
 fn print(
     args: &ProposePropertiesArgs,
     id: &str,
-    runs: &Runs,
+    runs: &GoodAndBad,
     proposed: &[Proposed],
     n_left: usize,
 ) {
@@ -494,7 +496,7 @@ fn print(
     }
 }
 
-fn as_json(id: &str, runs: &Runs, proposed: &[Proposed]) -> Value {
+fn as_json(id: &str, runs: &GoodAndBad, proposed: &[Proposed]) -> Value {
     let shown = |one: &Proposed| {
         let (candidate, found) = (&one.confirmed.candidate, &one.confirmed.found);
         json!({

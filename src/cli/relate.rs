@@ -69,7 +69,7 @@ pub fn relate(args: &RelateArgs) -> Result<u8, Diagnostics> {
     })
 }
 
-/// The pairs with what suggested commands need.
+/// The pairs, with the program and the history for suggested commands.
 pub fn summary(history: &History, related: RelatedRuns) -> RelationsSummary {
     RelationsSummary {
         related,

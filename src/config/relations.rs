@@ -48,7 +48,7 @@ impl SceneChange {
     }
 }
 
-/// A relation between two runs: how the second scene differs, and what must hold for both runs.
+/// A relation between two runs: the difference of the second scene, and the rules for both.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Relation {
     /// The difference between the scenes.

@@ -61,8 +61,8 @@ impl RobotCore {
         ["planar_x_joint", "planar_y_joint", "planar_heading_joint"];
 }
 
-/// A robot with all of its roles: what its profile states, and what was found on its model for the
-/// roles that the profile leaves out (see [`StatedRobot`](crate::StatedRobot)).
+/// A robot with all of its roles: those of its profile, and those that were found on its model
+/// because the profile leaves them out (see [`StatedRobot`](crate::StatedRobot)).
 #[derive(Debug, Clone, PartialEq)]
 pub struct RobotProfile {
     /// Its links and joints, and its place.

@@ -77,7 +77,7 @@ pub(super) fn beside(folder: &Path, relative: &str) -> PathBuf {
 }
 
 /// Percent-encodes a file name for an IRI.
-pub(super) fn encoded(name: &str) -> String {
+pub fn encoded(name: &str) -> String {
     let plain = |b: u8| b.is_ascii_alphanumeric() || b"-_.~".contains(&b);
     name.bytes()
         .map(|b| {

@@ -16,6 +16,7 @@ mod template;
 mod unlinked;
 
 pub use assemble::{load, load_vocabulary};
+pub use file_iri::encoded;
 pub use model::{Action, Ontology, Property, RuleFile, RuleLanguage, Vocabulary, VocabularyTerm};
 pub use read::triples_of;
 pub use template::{Template, property_template};

@@ -34,13 +34,13 @@ pub struct RelateOptions<'a> {
 }
 
 /// A pair whose second run is to be made.
-struct Order<'a> {
+struct PairToMake<'a> {
     row: &'a RunRow,
     change: SceneChange,
 }
 
 /// A second run, or why there is none.
-type Made = Result<Box<RunRecord>, String>;
+type SecondRun = Result<Box<RunRecord>, String>;
 
 /// Makes the missing second runs of a campaign's runs, stores them in a campaign of their own,
 /// judges all pairs by the present rules, and stores the results beside the campaign.
@@ -73,7 +73,7 @@ pub fn relate(
             .iter()
             .any(|pair| pair.run == run && pair.relation == change.word())
     };
-    let orders: Vec<Order<'_>> = rows
+    let orders: Vec<PairToMake<'_>> = rows
         .iter()
         .flat_map(|row| {
             let changes = env
@@ -81,7 +81,7 @@ pub fn relate(
                 .relations
                 .iter()
                 .map(|relation| relation.change);
-            changes.map(move |change| Order { row, change })
+            changes.map(move |change| PairToMake { row, change })
         })
         .filter(|order| options.only.is_none_or(|only| only == order.change.word()))
         .filter(|order| !is_known(&order.row.run, order.change))
@@ -117,7 +117,7 @@ pub fn relate(
 fn make(
     env: &Env,
     history: &History,
-    (campaign, orders): (&str, &[Order<'_>]),
+    (campaign, orders): (&str, &[PairToMake<'_>]),
     options: &RelateOptions<'_>,
     on_pair: &(impl Fn() + Sync),
     pairs: &mut Vec<RelatedPair>,
@@ -174,7 +174,7 @@ fn make(
     Ok(())
 }
 
-/// What a campaign's end needs of a run.
+/// The run without its motion: a campaign's end counts only its outcomes.
 fn without_motion(run: RunRecord) -> RunRecord {
     RunRecord {
         trace: Default::default(),
@@ -188,9 +188,9 @@ fn second_run(
     env: &Env,
     history: &History,
     id: &str,
-    order: &Order<'_>,
+    order: &PairToMake<'_>,
     context: &RunContext,
-) -> Result<Option<Made>, Diagnostics> {
+) -> Result<Option<SecondRun>, Diagnostics> {
     let recorded = history.traces().choices(&order.row.run)?;
     let index = env.index_of(&order.row.test, &recorded)?;
     Ok(made(env, id, (index, &recorded), order.change, context))
@@ -202,7 +202,7 @@ fn made(
     (index, recorded): (u64, &[Choice]),
     change: SceneChange,
     context: &RunContext,
-) -> Option<Made> {
+) -> Option<SecondRun> {
     let list = match change::changed(env, index, recorded, change) {
         Ok(list) => list,
         Err(reason) => return Some(Err(reason)),

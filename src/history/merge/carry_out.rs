@@ -100,8 +100,8 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    /// Adds the files about the campaigns: cross-checks and pairs of runs. What the destination
-    /// has already stays.
+    /// Adds the files about the campaigns: cross-checks and pairs of runs. Those of the destination
+    /// stay.
     fn add_companions(&self) -> Result<(), Diagnostics> {
         for (source, ids) in self.sources.iter().zip(&self.new_ids) {
             let of_run = |run: &str| ids.of_run(run).unwrap_or_else(|| run.to_owned());
