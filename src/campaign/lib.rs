@@ -3,6 +3,7 @@
 //!
 //! Never: prints, reads the command line or a system clock, or depends on the internals of a stage.
 
+mod appearance;
 mod attempt;
 mod broken_runs;
 mod budget;
@@ -48,6 +49,7 @@ mod tally;
 mod workers;
 
 pub use actcheck_world::{FingerJoint, Proposal, UnknownHand};
+pub use appearance::appearances;
 pub use budget::ExhaustedBudget;
 pub use changes::{ChangeKind, InputChange, changes, made_by_other_physics, other_physics};
 pub use cross_check::{judge_played, mapping_of, rules_of};

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use actcheck_base::{Below, Diagnostic, Diagnostics, Digest};
 use actcheck_config::Campaign;
 use actcheck_data::{Mesh, ObjectModel, Part, RobotProfile, Shape};
-use actcheck_world::{self as world, DecompositionFault, Robot};
+use actcheck_world::{self as world, DecompositionFault, Robot, RobotModel};
 
 /// Cache folder in the history's folder.
 const FOLDER: &str = "hulls";
@@ -132,6 +132,26 @@ pub(super) fn complete_robot(campaign: &mut Campaign) -> Result<Robot, world::Ro
         robot.profile = Arc::clone(&campaign.robot);
     }
     Ok(robot)
+}
+
+/// Returns the simulated links of a campaign's robot. Its meshes are decomposed only if its profile
+/// leaves out roles, which are found on them.
+///
+/// # Errors
+/// [`world::RobotError`] if the robot is not a single tree, or the roles can't be found.
+pub(super) fn robot_model(campaign: &mut Campaign) -> Result<RobotModel, world::RobotError> {
+    if world::is_incomplete(&campaign.robot) {
+        let mut cache = HullCache {
+            history: campaign.history.clone(),
+            known: BTreeMap::new(),
+        };
+        cache.fill(campaign.robot.meshes.values().flatten());
+        let robot = Arc::make_mut(&mut campaign.robot);
+        // A mesh that can't be decomposed was reported when the campaign was made.
+        decompose_with(&mut cache, robot, &mut Diagnostics::new());
+        campaign.robot = Arc::new(world::complete(&campaign.robot)?.profile);
+    }
+    RobotModel::read(&campaign.robot)
 }
 
 fn decompose_with(cache: &mut HullCache, robot: &mut RobotProfile, faults: &mut Diagnostics) {

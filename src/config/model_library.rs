@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use crate::foreign::{self, Lookup};
 use crate::paths::resolve_path;
+use crate::visuals::RobotPlace;
 use crate::{Furniture, Located, Table, WorldMap, model, robot, world_map};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Severity, Span, did_you_mean};
 use actcheck_data::{ObjectModel, Range, RobotProfile};
@@ -36,6 +37,8 @@ pub(crate) struct ModelLibrary {
     pub(crate) worlds: BTreeMap<String, Arc<WorldMap>>,
     /// Ranges of the base's initial x, y and heading.
     pub(crate) start: Option<[Range; 3]>,
+    /// Where the robot is.
+    pub(crate) robot: Option<RobotPlace>,
     /// Where `profile` of the table `[robot]` is.
     pub(crate) profile_at: Option<Span>,
     /// Warnings about ignored parts of the worlds.
@@ -72,6 +75,7 @@ pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
         uncategorised: BTreeSet::new(),
         worlds: BTreeMap::new(),
         start: None,
+        robot: None,
         profile_at: None,
         warnings: Diagnostics::new(),
     };
@@ -564,8 +568,14 @@ impl ModelLibrary {
         folder: &Path,
         found: &mut Diagnostics,
     ) -> Option<Arc<RobotProfile>> {
-        let (files, path, packages) = self.locate_robot(root, folder, found)?;
-        match robot::read_telling(&files, &path, &packages) {
+        let (files, profile, packages) = self.locate_robot(root, folder, found)?;
+        let read = robot::read_telling(&files, &profile, &packages);
+        self.robot = Some(RobotPlace {
+            files,
+            profile,
+            packages,
+        });
+        match read {
             Ok((profile, warnings)) => {
                 found.extend(warnings);
                 Some(Arc::new(profile))

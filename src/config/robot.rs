@@ -1,7 +1,7 @@
 //! Robot profiles: the roles of a URDF's joints and links.
 
 use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, Source, digest_of};
-use actcheck_data::RobotProfile;
+use actcheck_data::{RobotProfile, SeenLink};
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -172,6 +172,28 @@ pub fn with_urdf(profile: RobotProfile, urdf: Source) -> Result<RobotProfile, Di
         tree: Arc::new(tree),
         ..profile
     })
+}
+
+/// Reads what the links of a profile's robot look like, by the names in its file. Faults are
+/// warnings, and the links with faults have their collision shapes. Returns nothing if the profile
+/// can't be read: [`read_with`] reports the reason.
+pub(crate) fn seen(
+    files: &Files,
+    path: &Path,
+    packages: &[PathBuf],
+    found: &mut Diagnostics,
+) -> BTreeMap<String, SeenLink> {
+    let table = files.read(path).ok().map(|source| Table::parse(&source));
+    let Some(Ok(mut table)) = table else {
+        return BTreeMap::new();
+    };
+    let without = values(table.strings("no_collision_links").unwrap_or_default());
+    match find_urdf(files, path, packages, &mut table) {
+        (Some((urdf, path)), lookup) => {
+            foreign::robot::seen(&urdf, &path, &lookup, &without, found)
+        }
+        (None, _) => BTreeMap::new(),
+    }
 }
 
 /// A URDF with moments of inertia that a body can have, where its own are impossible (W034, W036).

@@ -77,8 +77,9 @@ pub use actcheck_geometry::{
 };
 pub use actcheck_robot::{
     BalancedJoint, Dynamics, FingerJoint, GRAVITY, Gripper, GripperFault, Joint, JointKind,
-    Kinematics, Layout, Proposal, Robot, RobotBody, RobotError, RobotMeasures, SelfContact,
-    UNKNOWN_EFFORT, UNKNOWN_SPEEDS, UnknownHand, complete, geometry, ik, is_incomplete, propose,
+    Kinematics, Layout, Proposal, Robot, RobotBody, RobotError, RobotMeasures, RobotModel,
+    SelfContact, UNKNOWN_EFFORT, UNKNOWN_SPEEDS, UnknownHand, complete, geometry, ik,
+    is_incomplete, propose,
 };
 
 /// Version of the physics: the same scene and commands give the same bits only with the same

@@ -151,10 +151,7 @@ impl<'a> Shapes<'a> {
     }
 
     fn mesh_file(&self, uri: &str) -> Result<mesh_file::MeshFile, Diagnostics> {
-        let path = self.lookup.resolve(uri, self.path).map_err(|reason| {
-            Diagnostic::error("W037", format!("cannot find the mesh `{uri}`: {reason}"))
-                .help(mesh_file::HOW_TO_NAME)
-        })?;
+        let path = mesh_file::find(self.lookup, self.path, uri)?;
         mesh_file::read(self.lookup.files, &path)
     }
 }
@@ -184,7 +181,12 @@ pub(crate) fn check_scale(
 }
 
 /// Whether a scaled mesh is not too large. Otherwise reports W034 at a place.
-fn check_reach(mesh: &Mesh, scale: [f64; 3], place: &SourceSpan, found: &mut Diagnostics) -> bool {
+pub(crate) fn check_reach(
+    mesh: &Mesh,
+    scale: [f64; 3],
+    place: &SourceSpan,
+    found: &mut Diagnostics,
+) -> bool {
     let along = |vertex: &[f64; 3]| {
         let scaled = vertex.iter().zip(&scale);
         scaled.fold(0.0_f64, |most, (along, by)| most.max((along * by).abs()))

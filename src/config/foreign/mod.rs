@@ -8,6 +8,7 @@ mod assembly;
 mod body;
 mod building;
 mod collada;
+mod colours;
 mod elements;
 mod folder;
 mod footprint;
@@ -54,6 +55,7 @@ mod sdf_robot_model;
 mod sdf_robot_tests;
 mod sdf_robot_tree;
 mod sdf_surface;
+mod seen;
 mod solid_mass;
 #[cfg(test)]
 mod stated_tests;

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::num::NonZero;
+use std::sync::Arc;
 use std::thread::available_parallelism;
 
 use serde_json::{Value, json};
@@ -12,8 +13,8 @@ use crate::html::pack::{Pack, packed};
 use crate::html::shapes::Shapes;
 use crate::pressed::hardest_of_run;
 use actcheck_base::{Outcome, names};
-use actcheck_data::{BodyState, Form, Role, Trace};
-use actcheck_history::RunDetail;
+use actcheck_data::{Appearances, BodyState, Form, Pose, Role, SeenPart, Snapshot, Trace};
+use actcheck_history::{ObjectDetail, RunDetail};
 
 /// Smallest quantisation step of positions, which is the resolution of traces. The step is larger
 /// if a run spans more than 6.5 m. Unit: metres.
@@ -30,11 +31,23 @@ pub type ReplayedRun = (RunDetail, Option<Trace>, Vec<Explained>);
 #[derive(Debug, Default)]
 pub struct Replays {
     shapes: Shapes,
+    /// What the bodies of campaigns look like, by the campaign's id.
+    appearances: BTreeMap<String, Arc<Appearances>>,
     runs: BTreeMap<String, String>,
     bytes: usize,
 }
 
 impl Replays {
+    /// Whether it is known what the bodies of a campaign look like.
+    pub fn knows(&self, campaign: &str) -> bool {
+        self.appearances.contains_key(campaign)
+    }
+
+    /// Sets what the bodies of a campaign look like, for runs that are added from now on.
+    pub fn set_appearances(&mut self, campaign: &str, appearances: Arc<Appearances>) {
+        self.appearances.insert(campaign.to_owned(), appearances);
+    }
+
     /// Adds a run. A run without a trace can't be played back, but its details are included.
     pub fn add(&mut self, run: &RunDetail, trace: Option<&Trace>, explained: &[Explained]) {
         let packed = self.bodies(run, trace).packed(run, trace, explained);
@@ -118,49 +131,93 @@ impl Replays {
             .flat_map(|state| &state.bodies);
         let bodies: BTreeMap<&str, &BodyState> =
             first.map(|body| (body.id.as_str(), body)).collect();
-        let roles: BTreeMap<&str, &str> = run
+        let objects: BTreeMap<&str, &ObjectDetail> = run
             .objects
             .iter()
-            .map(|object| (object.id.as_str(), role_name(object.role)))
+            .map(|object| (object.id.as_str(), object))
             .collect();
-        let mut form = |name: &str| match (forms.get(name), bodies.get(name)) {
-            (Some(form), _) => Some(self.shapes.of(form)),
-            (None, Some(body)) => Some(self.shapes.around(body)),
-            // A link without geometry is invisible.
-            (None, None) => None,
+        let campaign = run.row.campaign.as_str();
+        let appearances = self.appearances.get(campaign).cloned().unwrap_or_default();
+        let shapes = &mut self.shapes;
+        // The numbers of a body's shape, and of what it looks like if its shape is needed, too.
+        let mut body = |name: &str| -> Option<Value> {
+            if let Some(parts) = appearances.links.get(name) {
+                return Some(
+                    json!({ "name": name, "form": shapes.of_seen([campaign, name], parts) }),
+                );
+            }
+            let form = match (forms.get(name), bodies.get(name)) {
+                (Some(form), _) => shapes.of(form),
+                (None, Some(body)) => shapes.around(body),
+                // A link without geometry is invisible.
+                (None, None) => return None,
+            };
+            let object = objects.get(name);
+            let role = object.map(|object| role_name(object.role));
+            let mut value = json!({ "name": name, "form": form, "role": role });
+            if let Some((model, parts)) = object.and_then(|object| look(&appearances, object)) {
+                value["seen"] = shapes.of_seen([campaign, model], parts).into();
+            }
+            Some(value)
         };
         let frames = &trace.frames;
         let (mut slots, mut tracks): (Vec<usize>, Vec<Value>) = (Vec::new(), Vec::new());
         for (slot, name) in frames.names.iter().enumerate() {
-            if let Some(form) = form(name) {
+            if let Some(track) = body(name) {
                 slots.push(slot);
-                tracks
-                    .push(json!({ "name": name, "form": form, "role": roles.get(name.as_str()) }));
+                tracks.push(track);
             }
         }
-        let still = bodies.values().filter(|body| !frames.names.contains(&body.id)).filter_map(|body| {
-            let at: Vec<f64> = body.pose.position.iter().chain(&body.pose.rotation).copied().collect();
-            let (kind, role) = (names::local(&body.category), roles.get(body.id.as_str()));
-            Some(json!({ "name": body.id, "form": form(&body.id)?, "at": at, "kind": kind, "role": role }))
-        });
-        let still: Vec<Value> = still.collect();
-        let links = trace
-            .snapshots
-            .iter()
-            .take(1)
-            .flat_map(|state| trace.still_links(state));
-        let links = links.map(|(form, pose)| {
-            let at: Vec<f64> = pose.position.into_iter().chain(pose.rotation).collect();
-            let number = self.shapes.of(form);
-            json!({ "name": form.name, "form": number, "at": at, "kind": ROBOT, "role": ROBOT })
-        });
-        let links: Vec<Value> = links.collect();
+        let at = |pose: &Pose| -> Vec<f64> {
+            pose.position
+                .iter()
+                .chain(&pose.rotation)
+                .copied()
+                .collect()
+        };
+        let mut still = Vec::new();
+        for state in bodies
+            .values()
+            .filter(|body| !frames.names.contains(&body.id))
+        {
+            if let Some(mut value) = body(&state.id) {
+                value["at"] = at(&state.pose).into();
+                value["kind"] = names::local(&state.category).into();
+                still.push(value);
+            }
+        }
+        for (name, pose) in trace.snapshots.iter().take(1).flat_map(links) {
+            if frames.names.contains(&name) {
+                continue;
+            }
+            if let Some(mut value) = body(&name) {
+                value["at"] = at(&pose).into();
+                value["kind"] = ROBOT.into();
+                value["role"] = ROBOT.into();
+                still.push(value);
+            }
+        }
         Bodies {
-            still: still.into_iter().chain(links).collect(),
+            still,
             tracks,
             slots,
         }
     }
+}
+
+/// What an object looks like, with the name of its model.
+fn look<'a>(
+    appearances: &'a Appearances,
+    object: &ObjectDetail,
+) -> Option<(&'a str, &'a [SeenPart])> {
+    let (model, parts) = appearances.models.get_key_value(&object.model)?;
+    Some((model, parts))
+}
+
+/// The robot's links in a state, by their names in traces.
+fn links(state: &Snapshot) -> impl Iterator<Item = (String, Pose)> {
+    let links = state.robot.links.iter();
+    links.map(|link| (format!("robot/{}", link.name), link.pose))
 }
 
 /// The bodies of a run: fixed ones and tracks, as the page gets them.

@@ -46,6 +46,7 @@ pub fn run_picture(caption: &Caption, trace: &Trace) -> Option<Drawing> {
         trace,
         paths: &paths,
         roles: &caption.roles,
+        seen: &caption.seen,
         pressed: hardest_of_run(
             trace,
             caption
