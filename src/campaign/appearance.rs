@@ -1,7 +1,5 @@
 //! What the bodies of a stored campaign look like, for pictures of its runs.
 
-use std::collections::BTreeMap;
-
 use crate::environment::stored_campaign;
 use crate::solids;
 use actcheck_base::Diagnostics;
@@ -35,15 +33,21 @@ pub fn appearances(
     if !record.models.contains(&robot) {
         return Ok(Appearances::default());
     }
-    let of_file = campaign.visuals.robot(found);
-    if !of_file.values().any(|seen| seen.has_look) {
-        return Ok(Appearances::default());
+    let mut all = Appearances::default();
+    for name in campaign.used_models() {
+        let digest = campaign.models.get(&name).map(|model| &model.digest);
+        let is_same =
+            digest.is_some_and(|digest| record.models.contains(&(name.clone(), digest.clone())));
+        let parts = is_same.then(|| campaign.visuals.model(&name, found));
+        all.models
+            .extend(parts.flatten().map(|parts| (name, parts)));
     }
-    let links = solids::robot_model(&mut campaign).map(|model| model.seen(&of_file));
-    let mut all = Appearances {
-        links: links.unwrap_or_default(),
-        models: BTreeMap::new(),
-    };
+    let of_file = campaign.visuals.robot(found);
+    if of_file.values().any(|seen| seen.has_look)
+        && let Ok(model) = solids::robot_model(&mut campaign)
+    {
+        all.links = model.seen(&of_file);
+    }
     reduce(&mut all);
     Ok(all)
 }

@@ -8,7 +8,7 @@ use crate::designators::{self, Designators};
 use crate::paths::{check_unnamed, resolve_path};
 use crate::robot::{MendedUrdf, mended};
 use crate::table::WrittenStep;
-use crate::{Campaign, Overrides, Step, Table, VisualFiles, case, model_library, ranges, skill};
+use crate::{Campaign, Overrides, Step, Table, case, model_library, ranges, skill};
 use actcheck_base::{
     Diagnostic, Diagnostics, Files, Keep, Keeping, Severity, Source, Span, did_you_mean,
 };
@@ -126,8 +126,8 @@ pub fn load_text(
         .cloned()
         .collect();
 
-    let (robot, place) = match (robot, library.robot) {
-        (Some(robot), Some(place)) if !found.has_errors() => (robot, place),
+    let (robot, visuals) = match (robot, library.visuals()) {
+        (Some(robot), Some(visuals)) if !found.has_errors() => (robot, visuals),
         _ => return Err(in_order_of_place(found)),
     };
     Ok(Campaign {
@@ -144,7 +144,7 @@ pub fn load_text(
         uncategorised: library.uncategorised,
         worlds: library.worlds,
         robot,
-        visuals: VisualFiles { robot: place },
+        visuals,
         nav_obstacles,
         nav_obstacle_count,
         nav_may_block,

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use crate::foreign::{self, Lookup};
 use crate::paths::resolve_path;
-use crate::visuals::RobotPlace;
+use crate::visuals::{RobotPlace, VisualFiles};
 use crate::{Furniture, Located, Table, WorldMap, model, robot, world_map};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Severity, Span, did_you_mean};
 use actcheck_data::{ObjectModel, Range, RobotProfile};
@@ -37,8 +37,10 @@ pub(crate) struct ModelLibrary {
     pub(crate) worlds: BTreeMap<String, Arc<WorldMap>>,
     /// Ranges of the base's initial x, y and heading.
     pub(crate) start: Option<[Range; 3]>,
+    /// The files of SDF, URDF and MJCF models, by the model's name.
+    foreign: BTreeMap<String, PathBuf>,
     /// Where the robot is.
-    pub(crate) robot: Option<RobotPlace>,
+    robot: Option<RobotPlace>,
     /// Where `profile` of the table `[robot]` is.
     pub(crate) profile_at: Option<Span>,
     /// Warnings about ignored parts of the worlds.
@@ -75,6 +77,7 @@ pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
         uncategorised: BTreeSet::new(),
         worlds: BTreeMap::new(),
         start: None,
+        foreign: BTreeMap::new(),
         robot: None,
         profile_at: None,
         warnings: Diagnostics::new(),
@@ -122,10 +125,7 @@ impl ModelLibrary {
     /// Reads the SDF and URDF models.
     fn read_foreign(&mut self) {
         let files = self.files.clone();
-        let lookup = Lookup {
-            files: &files,
-            folders: self.foreign_folders(),
-        };
+        let lookup = Lookup::new(&files, self.foreign_folders());
         for model in self
             .foreign_folders()
             .iter()
@@ -137,6 +137,7 @@ impl ModelLibrary {
             }
             match foreign::read(&model, &lookup) {
                 Ok(read) => {
+                    self.foreign.insert(model.name.clone(), model.path.clone());
                     self.models.insert(model.name.clone(), Arc::new(read.model));
                     self.uncategorised.insert(model.name.clone());
                     self.diagnostics.insert(model.name.clone(), read.warnings);
@@ -148,6 +149,16 @@ impl ModelLibrary {
             }
             self.names.push(model.name);
         }
+    }
+
+    /// Returns where the visual shapes are; `None` without a robot.
+    pub(crate) fn visuals(&self) -> Option<VisualFiles> {
+        Some(VisualFiles {
+            robot: self.robot.clone()?,
+            files: self.files.clone(),
+            folders: self.foreign_folders(),
+            models: self.foreign.clone(),
+        })
     }
 
     /// Warns about a second model of a name.
@@ -354,10 +365,7 @@ impl ModelLibrary {
                 Err(faults) => (None, faults),
             }
         } else {
-            let lookup = Lookup {
-                files: &files,
-                folders: self.foreign_folders(),
-            };
+            let lookup = Lookup::new(&files, self.foreign_folders());
             let included = foreign::world::WorldModels {
                 models: &self.models,
                 posed: &self.posed,

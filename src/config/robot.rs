@@ -246,7 +246,7 @@ fn find_urdf<'a>(
         .map(|written| resolve_path(folder, &written))
         .collect();
     let Some(written) = table.string("urdf") else {
-        return (None, Lookup { files, folders });
+        return (None, Lookup::new(files, folders));
     };
     let path = resolve_path(folder, &written.value);
     folders.extend(around(&path, packages));
@@ -258,7 +258,7 @@ fn find_urdf<'a>(
         for (span, Unexpanded { message, help }) in refused {
             table.fault("W013", span, message, help);
         }
-        return (None, Lookup { files, folders });
+        return (None, Lookup::new(files, folders));
     }
     let arguments = values(arguments);
     let urdf = match text_of(
@@ -275,7 +275,7 @@ fn find_urdf<'a>(
             None
         }
     };
-    (urdf, Lookup { files, folders })
+    (urdf, Lookup::new(files, folders))
 }
 
 /// The words of the command that reading a profile starts: of `xacro`, if its URDF is to be
@@ -333,7 +333,7 @@ pub fn bare(
     )
     .map_err(Unread::faults)?;
     let mut found = Diagnostics::new();
-    let read = foreign::robot::read(&urdf, path, &Lookup { files, folders }, &mut found);
+    let read = foreign::robot::read(&urdf, path, &Lookup::new(files, folders), &mut found);
     found.or(())?;
     let incomplete = || Diagnostic::error("W010", "the robot has no links").in_source(&urdf);
     let read = read.ok_or_else(incomplete)?;

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use crate::{Mesh, Part, Pose, Shape};
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3};
 
 /// A colour in sRGB. Shape: red, green, blue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -48,7 +48,7 @@ pub struct SeenPart {
 }
 
 /// What a link of a model's file looks like.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct SeenLink {
     /// Its visual shapes or, without these, its collision shapes. Frame: the link's.
     pub parts: Vec<SeenPart>,
@@ -63,6 +63,21 @@ pub struct Appearances {
     pub links: BTreeMap<String, Vec<SeenPart>>,
     /// Of objects, by the name of the model. Frame: the model's.
     pub models: BTreeMap<String, Vec<SeenPart>>,
+}
+
+impl SeenLink {
+    /// Moves it into the frame in which `by` is its pose.
+    pub fn transform(&mut self, by: &Isometry3<f64>) {
+        for seen in &mut self.parts {
+            seen.part.pose = Pose::from_isometry(&(by * seen.part.pose.to_isometry()));
+        }
+    }
+
+    /// Adds a link that moves with this one.
+    pub fn add(&mut self, other: Self) {
+        self.parts.extend(other.parts);
+        self.has_look |= other.has_look;
+    }
 }
 
 impl SeenPart {

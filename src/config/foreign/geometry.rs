@@ -7,6 +7,7 @@ use std::path::Path;
 use crate::foreign::inclusions::Inclusions;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::mesh_file;
+use crate::foreign::seen::SeenShapes;
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostic, Diagnostics, Digest, SourceSpan};
 use actcheck_data::{Mesh, ModelTree, Shape, TreeGeometry, TreeSolid};
@@ -22,6 +23,8 @@ pub(crate) struct Shapes<'a> {
     pub(crate) inclusions: Inclusions,
     /// Warnings about mesh files without a text, each of which is given once.
     pub(crate) warned: BTreeSet<String>,
+    /// The reader of visual shapes, if they are to be read.
+    pub(crate) seen: Option<SeenShapes<'a>>,
 }
 
 /// Help text with the supported kinds of geometry.
@@ -35,6 +38,7 @@ impl<'a> Shapes<'a> {
             digest: Digest::new(),
             inclusions: Inclusions::default(),
             warned: BTreeSet::new(),
+            seen: lookup.looks.as_ref().map(|_| SeenShapes::new(lookup, path)),
         }
     }
 

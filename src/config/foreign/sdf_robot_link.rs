@@ -102,7 +102,7 @@ fn check_motion(link: Node, reader: &mut Reader) {
 
 /// The colour of a `<visual>`: its material's in diffuse or, without one, ambient light. Reports one
 /// that is not made of numbers (W036).
-pub(super) fn colour(visual: Node, reader: &mut Reader) -> Option<TreeColour> {
+fn colour(visual: Node, reader: &mut Reader) -> Option<TreeColour> {
     let material = xml::child(visual, "material")?;
     let light = ["diffuse", "ambient"]
         .into_iter()
@@ -120,7 +120,7 @@ pub(super) fn colour(visual: Node, reader: &mut Reader) -> Option<TreeColour> {
 }
 
 /// Reads a shape; `None` if it has none, or after a fault.
-fn solid(
+pub(super) fn solid(
     node: Node,
     link: &str,
     file: &SdfFile,

@@ -64,6 +64,21 @@ impl<'a> SeenShapes<'a> {
         }
     }
 
+    /// As [`Self::of_link`], for a link of an object; its faults are those of the lookup.
+    pub(crate) fn of_object(&mut self, link: &TreeLink, tree: &ModelTree) -> SeenLink {
+        let mut found = Diagnostics::new();
+        let seen = self.of_link(link, true, tree, &mut found);
+        self.report(found);
+        seen
+    }
+
+    /// Adds faults to those of the lookup.
+    pub(crate) fn report(&self, found: Diagnostics) {
+        if let Some(looks) = &self.lookup.looks {
+            looks.borrow_mut().extend(found);
+        }
+    }
+
     /// Returns all shapes, or `None` if one has a fault.
     fn all(
         &mut self,

@@ -50,7 +50,7 @@ impl Replays {
 
     /// Adds a run. A run without a trace can't be played back, but its details are included.
     pub fn add(&mut self, run: &RunDetail, trace: Option<&Trace>, explained: &[Explained]) {
-        let packed = self.bodies(run, trace).packed(run, trace, explained);
+        let packed = self.bodies(place(run), trace).packed(run, trace, explained);
         self.insert(run, packed);
     }
 
@@ -64,7 +64,7 @@ impl Replays {
             Vec::with_capacity(runs.len()),
         );
         for run in runs {
-            numbered.push((run, self.bodies(&run.0, run.1.as_ref())));
+            numbered.push((run, self.bodies(place(&run.0), run.1.as_ref())));
             shapes.push(self.shapes.all().len());
         }
         let of_a_worker = runs
@@ -114,8 +114,12 @@ impl Replays {
         packed(json!(self.shapes.all()).to_string().as_bytes())
     }
 
-    /// The bodies of a run, with the numbers of their shapes.
-    fn bodies(&mut self, run: &RunDetail, trace: Option<&Trace>) -> Bodies {
+    /// The bodies of a run, with the numbers of their shapes, by its campaign and its objects.
+    fn bodies(
+        &mut self,
+        (campaign, objects): (&str, &[ObjectDetail]),
+        trace: Option<&Trace>,
+    ) -> Bodies {
         let Some(trace) = trace.filter(|trace| !trace.snapshots.is_empty()) else {
             return Bodies::default();
         };
@@ -131,12 +135,10 @@ impl Replays {
             .flat_map(|state| &state.bodies);
         let bodies: BTreeMap<&str, &BodyState> =
             first.map(|body| (body.id.as_str(), body)).collect();
-        let objects: BTreeMap<&str, &ObjectDetail> = run
-            .objects
+        let objects: BTreeMap<&str, &ObjectDetail> = objects
             .iter()
             .map(|object| (object.id.as_str(), object))
             .collect();
-        let campaign = run.row.campaign.as_str();
         let appearances = self.appearances.get(campaign).cloned().unwrap_or_default();
         let shapes = &mut self.shapes;
         // The numbers of a body's shape, and of what it looks like if its shape is needed, too.
@@ -203,6 +205,11 @@ impl Replays {
             slots,
         }
     }
+}
+
+/// The campaign and the objects of a run.
+fn place(run: &RunDetail) -> (&str, &[ObjectDetail]) {
+    (&run.row.campaign, &run.objects)
 }
 
 /// What an object looks like, with the name of its model.
@@ -383,6 +390,90 @@ fn corner(rows: &[Vec<f32>], slots: &[usize]) -> ([f64; 3], f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::made_up::snapshot;
+    use actcheck_data::{Colour, Frames, LinkState, Part, Shape};
+
+    /// The mesh of a robot is in the page once, however many runs it has.
+    #[test]
+    fn what_bodies_look_like_is_shared_by_all_runs_of_a_campaign() {
+        let look = |red: u8| {
+            vec![SeenPart {
+                part: Part {
+                    pose: Pose::IDENTITY,
+                    shape: Shape::Box { size: [0.1; 3] },
+                },
+                colour: Some(Colour([red, 0, 0])),
+            }]
+        };
+        let mut state = snapshot(0.0);
+        state.robot.links = ["hand", "pedestal"]
+            .map(|name| LinkState {
+                name: name.to_owned(),
+                pose: Pose::IDENTITY,
+            })
+            .into();
+        let trace = Trace {
+            snapshots: vec![state],
+            frames: Frames {
+                names: vec!["glass_1".to_owned(), "robot/hand".to_owned()],
+                ..Frames::default()
+            },
+            ..Trace::default()
+        };
+        let glass = ObjectDetail {
+            id: "glass_1".to_owned(),
+            model: "glass".to_owned(),
+            category: String::new(),
+            role: Role::Target,
+            x: 0.0,
+            y: 0.0,
+            z: 0.0,
+            yaw: 0.0,
+            mass_kg: 1.0,
+            friction: 1.0,
+            restitution: 0.0,
+            robot_distance_m: 1.0,
+            neighbour_distance_m: None,
+            target_distance_m: None,
+            displacement_m: None,
+            max_tilt_rad: None,
+        };
+        let mut replays = Replays::default();
+        let appearances = Appearances {
+            links: [("robot/hand", 1), ("robot/pedestal", 2)]
+                .map(|(name, red)| (name.to_owned(), look(red)))
+                .into(),
+            models: [("glass".to_owned(), look(3))].into(),
+        };
+        assert!(!replays.knows("a"));
+        replays.set_appearances("a", Arc::new(appearances));
+        assert!(replays.knows("a"));
+        let mut of = |campaign: &str| {
+            let bodies = replays.bodies((campaign, std::slice::from_ref(&glass)), Some(&trace));
+            let named = |value: &Value| {
+                let number = |key: &str| value[key].as_u64();
+                (value["name"].to_string(), number("form"), number("seen"))
+            };
+            let tracks: Vec<_> = bodies.tracks.iter().map(named).collect();
+            let still: Vec<_> = bodies.still.iter().map(named).collect();
+            (tracks, still)
+        };
+        let (tracks, still) = of("a");
+        // The shape of the glass is needed to measure distances.
+        let of_hand = ("\"robot/hand\"".to_owned(), Some(2), None);
+        assert_eq!(
+            tracks,
+            [("\"glass_1\"".to_owned(), Some(0), Some(1)), of_hand]
+        );
+        // The pedestal has no track and no collision shape.
+        assert_eq!(still[1], ("\"robot/pedestal\"".to_owned(), Some(3), None));
+        assert_eq!(of("a"), (tracks, still));
+        // Of another campaign, nothing is known.
+        let (tracks, still) = of("b");
+        assert_eq!((tracks.len(), still.len()), (1, 1));
+        assert_eq!(tracks[0].2, None);
+        assert_eq!(replays.shapes.all().len(), 4);
+    }
 
     /// The page may depend neither on the number of cores nor on how many runs are read at once.
     #[test]
