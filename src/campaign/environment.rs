@@ -361,6 +361,19 @@ fn stored_configuration(history: &History, record: &CampaignRecord) -> (Source, 
     (source, path.parent().unwrap_or(Path::new("")).to_owned())
 }
 
+/// Reads the configuration of a campaign of a history, with its robot and models.
+///
+/// # Errors
+/// As [`config::load_text`], or if it was imported.
+pub(super) fn stored_campaign(
+    history: &History,
+    record: &CampaignRecord,
+) -> Result<Campaign, Diagnostics> {
+    can_be_simulated(record)?;
+    let (source, folder) = stored_configuration(history, record);
+    config::load_text(source, &folder, &recorded_overrides(history, record))
+}
+
 /// The command-line overrides with which a campaign of a history began, except the number of runs.
 pub(super) fn recorded_overrides(history: &History, record: &CampaignRecord) -> Overrides {
     // A campaign merged from several shards is treated as a whole, so its missing shards belong to

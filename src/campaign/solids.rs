@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use actcheck_base::{Below, Diagnostic, Diagnostics, Digest};
 use actcheck_config::Campaign;
 use actcheck_data::{Mesh, ObjectModel, Part, RobotCore, Shape, StatedRobot};
-use actcheck_world::{self as world, DecompositionFault, Robot};
+use actcheck_world::{self as world, DecompositionFault, Robot, RobotModel};
 
 /// Cache folder in the history's folder.
 const FOLDER: &str = "hulls";
@@ -129,6 +129,29 @@ pub(super) fn complete_robot(stated: &StatedRobot) -> Result<Robot, world::Robot
         Arc::make_mut(&mut robot.profile).hand.grip_force_n = limit_n;
     }
     Ok(robot)
+}
+
+/// Returns the simulated links of a campaign's robot. Its meshes are decomposed only if its profile
+/// leaves out roles, which are found on them.
+///
+/// # Errors
+/// [`world::RobotError`] if the robot is not a single tree, or the roles can't be found.
+pub(super) fn robot_model(campaign: &mut Campaign) -> Result<RobotModel, world::RobotError> {
+    let profile = match campaign.robot.complete() {
+        Ok(profile) => profile,
+        Err(_) => {
+            let mut cache = HullCache {
+                history: campaign.history.clone(),
+                known: BTreeMap::new(),
+            };
+            let robot = &mut Arc::make_mut(&mut campaign.robot).core;
+            cache.fill(robot.meshes.values().flatten());
+            // A mesh that can't be decomposed was reported when the campaign was made.
+            decompose_with(&mut cache, robot, &mut Diagnostics::new());
+            world::complete(&campaign.robot)?.profile
+        }
+    };
+    RobotModel::read(profile.roles())
 }
 
 fn decompose_with(cache: &mut HullCache, robot: &mut RobotCore, faults: &mut Diagnostics) {

@@ -6,6 +6,7 @@ mod replay;
 mod replay_text;
 
 mod analyse;
+mod appearance;
 mod args;
 mod audit;
 mod bisect;

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::appearance::AppearanceReader;
 use crate::output_file;
 use crate::replayed_runs::explained;
 use crate::why::ontology_file;
@@ -50,7 +51,7 @@ impl<'a> Picture<'a> {
     }
 
     /// Draws a run, with the signals that decided its failed properties about time by the rules of
-    /// an ontology, or of the usual one.
+    /// an ontology, or of the usual one. `looks` tells what bodies look like.
     ///
     /// # Errors
     /// X006: the run has no state to draw; X007: the file can't be written.
@@ -59,6 +60,7 @@ impl<'a> Picture<'a> {
         history: &History,
         run: &RunDetail,
         ontology: Option<&Path>,
+        mut looks: AppearanceReader<'_>,
     ) -> Result<(), Diagnostics> {
         // Without its motion, the states before and after are drawn.
         let id = &run.row.run;
@@ -66,10 +68,11 @@ impl<'a> Picture<'a> {
             .traces()
             .whole_if_allowed(id)?
             .map_or_else(|| history.traces().states(id), Ok)?;
+        let appearances = looks.of(&run.row.campaign)?;
         let drawing = run_picture(
             &Caption {
                 charts: charts(&trace, run, ontology),
-                ..Caption::of(run)
+                ..Caption::of(run).with_appearances(run, &appearances)
             },
             &trace,
         )

@@ -126,7 +126,7 @@ fn write_reports_with_replays(
     let room = args.replay_mb * BYTES_IN_A_MB;
     let mut told = Vec::new();
     if let Some(file) = &args.html {
-        let page = report_html::page(&found, history, room)?;
+        let page = report_html::page(&found, history, room, args.trust.trust)?;
         if file.as_os_str() == "-" {
             output::print(&page);
         } else {

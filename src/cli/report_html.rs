@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 use crate::analyse::Analysed;
+use crate::appearance::AppearanceReader;
 use crate::margin_bounds::margin_bounds;
 use crate::{clock, replayed_runs, work};
 use actcheck_base::Diagnostics;
@@ -18,7 +19,12 @@ use actcheck_report::{
 ///
 /// # Errors
 /// The history can't be read.
-pub(super) fn page(found: &Analysed, history: &History, room: f64) -> Result<String, Diagnostics> {
+pub(super) fn page(
+    found: &Analysed,
+    history: &History,
+    room: f64,
+    is_trusted: bool,
+) -> Result<String, Diagnostics> {
     let Analysed {
         table,
         sample,
@@ -29,7 +35,10 @@ pub(super) fn page(found: &Analysed, history: &History, room: f64) -> Result<Str
     // Of a million runs, each takes seconds.
     let (runs, replays) = work::both(
         || PackedRuns::of(summary, table, sample.as_ref()),
-        || replays(history, ontology, &order, room),
+        || {
+            let looks = AppearanceReader::new(history, is_trusted);
+            replays(history, looks, ontology, &order, room)
+        },
     );
     let replays = replays?;
     Ok(html(&HtmlReport {
@@ -84,6 +93,7 @@ fn words(ontology: &Ontology) -> BTreeMap<String, PropertyWords> {
 /// Replays of as many runs as fit into `room` bytes.
 fn replays(
     history: &History,
+    mut looks: AppearanceReader,
     ontology: &Ontology,
     order: &[String],
     room: f64,
@@ -93,6 +103,12 @@ fn replays(
         return Ok(replays);
     }
     replayed_runs::for_each_batch(history, ontology, order, |batch| {
+        for (run, ..) in &batch {
+            let campaign = &run.row.campaign;
+            if !replays.knows(campaign) {
+                replays.set_appearances(campaign, looks.of(campaign)?);
+            }
+        }
         replays.add_all(&batch, room);
         Ok(if replays.bytes() as f64 >= room {
             ControlFlow::Break(())

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use crate::appearance::AppearanceReader;
 use crate::options::{Format, HistoryArgs};
 use crate::picture::Picture;
 use crate::trust::TrustArgs;
@@ -65,7 +66,10 @@ pub fn show(args: &ShowArgs) -> Result<(), Diagnostics> {
         return Err(faults);
     }
     match picture {
-        Some(picture) => picture.draw(&history, &run, args.ontology.as_deref()),
+        Some(picture) => {
+            let looks = AppearanceReader::new(&history, args.trust.trust);
+            picture.draw(&history, &run, args.ontology.as_deref(), looks)
+        }
         None => Ok(()),
     }
 }

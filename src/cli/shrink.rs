@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
 
+use crate::appearance::AppearanceReader;
 use crate::option_fault::OptionFault;
 use crate::options::{Format, HistoryArgs, duration};
 use crate::picture::Picture;
@@ -101,7 +102,9 @@ pub fn shrink(args: &ShrinkArgs) -> Result<u8, Diagnostics> {
         Format::Json => format!("{:#}\n", shrunk_json(&shrunk)),
     });
     if let Some(picture) = picture {
-        picture.draw(&history, &shrunk.run, None)?;
+        // The robot's file was expanded to simulate the run.
+        let looks = AppearanceReader::new(&history, true);
+        picture.draw(&history, &shrunk.run, None, looks)?;
     }
     Ok(if asked.load(Ordering::Relaxed) {
         stop::INTERRUPTED

@@ -36,6 +36,21 @@ pub fn starts_none(campaign: &str, starts: &Starts) -> bool {
     false
 }
 
+/// Whether reading what the robot of a campaign looks like starts no program. If it does, a warning
+/// names the command.
+pub fn expands_none(campaign: &str, starts: &Starts) -> bool {
+    let Some(commands) = in_words(&starts.expansion) else {
+        return true;
+    };
+    let message = format!(
+        "pictures show the collision shapes of the robot of campaign {campaign}: reading what it looks like would start \
+         {commands}"
+    );
+    let help = "a xacro file may contain code: read it, then give the same command with `--trust`";
+    output::print_diagnostics(&Diagnostic::warning("X059", message).help(help).into());
+    false
+}
+
 /// Checks that a campaign of a history can be prepared again without consent: no program expands
 /// its robot's file.
 ///

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::{Case, Launcher, OtherCounts, Relation, Step, WorldMap, designators};
+use crate::{Case, Launcher, OtherCounts, Relation, Step, VisualFiles, WorldMap, designators};
 
 /// One campaign: runs every test in `test_count` scenes, `repeat` times in each.
 #[derive(Debug, Clone)]
@@ -37,6 +37,8 @@ pub struct Campaign {
     pub worlds: BTreeMap<String, Arc<WorldMap>>,
     /// The robot as its profile states it (`[robot]`).
     pub robot: Arc<StatedRobot>,
+    /// Where the visual shapes are, for pictures.
+    pub visuals: VisualFiles,
     /// Names of the obstacle models (`nav_obstacle_list`).
     pub nav_obstacles: Vec<String>,
     /// Number of obstacles on the floor (`nav_obstacle_count`).

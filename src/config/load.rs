@@ -127,8 +127,8 @@ pub fn load_text(
         .cloned()
         .collect();
 
-    let robot = match robot {
-        Some(robot) if !found.has_errors() => robot,
+    let (robot, visuals) = match (robot, library.visuals()) {
+        (Some(robot), Some(visuals)) if !found.has_errors() => (robot, visuals),
         _ => return Err(in_order_of_place(found)),
     };
     Ok(Campaign {
@@ -145,6 +145,7 @@ pub fn load_text(
         uncategorised: library.uncategorised,
         worlds: library.worlds,
         robot,
+        visuals,
         nav_obstacles,
         nav_obstacle_count,
         nav_may_block,

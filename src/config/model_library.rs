@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use crate::foreign::{self, Lookup};
 use crate::paths::resolve_path;
+use crate::visuals::{RobotPlace, VisualFiles};
 use crate::{Furniture, Located, Table, WorldMap, model, robot, world_map};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Severity, Span, did_you_mean};
 use actcheck_data::{ObjectModel, Range, StatedRobot};
@@ -36,6 +37,10 @@ pub(crate) struct ModelLibrary {
     pub(crate) worlds: BTreeMap<String, Arc<WorldMap>>,
     /// Ranges of the base's initial x, y and heading.
     pub(crate) start: Option<[Range; 3]>,
+    /// The files of SDF, URDF and MJCF models, by the model's name.
+    foreign: BTreeMap<String, PathBuf>,
+    /// Where the robot is.
+    robot: Option<RobotPlace>,
     /// Where `profile` of the table `[robot]` is.
     pub(crate) profile_at: Option<Span>,
     /// Warnings about ignored parts of the worlds.
@@ -72,6 +77,8 @@ pub(crate) fn read(table: &mut Table, folder: &Path, found: &mut Diagnostics) ->
         uncategorised: BTreeSet::new(),
         worlds: BTreeMap::new(),
         start: None,
+        foreign: BTreeMap::new(),
+        robot: None,
         profile_at: None,
         warnings: Diagnostics::new(),
     };
@@ -118,10 +125,7 @@ impl ModelLibrary {
     /// Reads the SDF and URDF models.
     fn read_foreign(&mut self) {
         let files = self.files.clone();
-        let lookup = Lookup {
-            files: &files,
-            folders: self.foreign_folders(),
-        };
+        let lookup = Lookup::new(&files, self.foreign_folders());
         for model in self
             .foreign_folders()
             .iter()
@@ -133,6 +137,7 @@ impl ModelLibrary {
             }
             match foreign::read(&model, &lookup) {
                 Ok(read) => {
+                    self.foreign.insert(model.name.clone(), model.path.clone());
                     self.models.insert(model.name.clone(), Arc::new(read.model));
                     self.uncategorised.insert(model.name.clone());
                     self.diagnostics.insert(model.name.clone(), read.warnings);
@@ -144,6 +149,16 @@ impl ModelLibrary {
             }
             self.names.push(model.name);
         }
+    }
+
+    /// Returns where the visual shapes are; `None` without a robot.
+    pub(crate) fn visuals(&self) -> Option<VisualFiles> {
+        Some(VisualFiles {
+            robot: self.robot.clone()?,
+            files: self.files.clone(),
+            folders: self.foreign_folders(),
+            models: self.foreign.clone(),
+        })
     }
 
     /// Warns about a second model of a name.
@@ -350,10 +365,7 @@ impl ModelLibrary {
                 Err(faults) => (None, faults),
             }
         } else {
-            let lookup = Lookup {
-                files: &files,
-                folders: self.foreign_folders(),
-            };
+            let lookup = Lookup::new(&files, self.foreign_folders());
             let included = foreign::world::WorldModels {
                 models: &self.models,
                 posed: &self.posed,
@@ -564,8 +576,14 @@ impl ModelLibrary {
         folder: &Path,
         found: &mut Diagnostics,
     ) -> Option<Arc<StatedRobot>> {
-        let (files, path, packages) = self.locate_robot(root, folder, found)?;
-        match robot::read_telling(&files, &path, &packages) {
+        let (files, profile, packages) = self.locate_robot(root, folder, found)?;
+        let read = robot::read_telling(&files, &profile, &packages);
+        self.robot = Some(RobotPlace {
+            files,
+            profile,
+            packages,
+        });
+        match read {
             Ok((profile, warnings)) => {
                 found.extend(warnings);
                 Some(Arc::new(profile))

@@ -1,7 +1,9 @@
 //! Robot profiles: the roles of a URDF's joints and links.
 
 use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, Source, digest_of};
-use actcheck_data::{LinkFrame, RobotCore, RobotProfile, StatedFingers, StatedHand, StatedRobot};
+use actcheck_data::{
+    LinkFrame, RobotCore, RobotProfile, SeenLink, StatedFingers, StatedHand, StatedRobot,
+};
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -166,6 +168,28 @@ pub fn with_urdf(core: RobotCore, urdf: Source) -> Result<RobotCore, Diagnostics
     })
 }
 
+/// Reads what the links of a profile's robot look like, by the names in its file. Faults are
+/// warnings, and the links with faults have their collision shapes. Returns nothing if the profile
+/// can't be read: [`read_with`] reports the reason.
+pub(crate) fn seen(
+    files: &Files,
+    path: &Path,
+    packages: &[PathBuf],
+    found: &mut Diagnostics,
+) -> BTreeMap<String, SeenLink> {
+    let table = files.read(path).ok().map(|source| Table::parse(&source));
+    let Some(Ok(mut table)) = table else {
+        return BTreeMap::new();
+    };
+    let without = values(table.strings("no_collision_links").unwrap_or_default());
+    match find_urdf(files, path, packages, &mut table) {
+        (Some((urdf, path)), lookup) => {
+            foreign::robot::seen(&urdf, &path, &lookup, &without, found)
+        }
+        (None, _) => BTreeMap::new(),
+    }
+}
+
 /// A URDF with moments of inertia that a body can have, where its own are impossible (W034, W036).
 #[derive(Debug, Clone, PartialEq)]
 pub struct MendedUrdf {
@@ -216,7 +240,7 @@ fn find_urdf<'a>(
         .map(|written| resolve_path(folder, &written))
         .collect();
     let Some(written) = table.string("urdf") else {
-        return (None, Lookup { files, folders });
+        return (None, Lookup::new(files, folders));
     };
     let path = resolve_path(folder, &written.value);
     folders.extend(around(&path, packages));
@@ -228,7 +252,7 @@ fn find_urdf<'a>(
         for (span, Unexpanded { message, help }) in refused {
             table.fault("W013", span, message, help);
         }
-        return (None, Lookup { files, folders });
+        return (None, Lookup::new(files, folders));
     }
     let arguments = values(arguments);
     let urdf = match text_of(
@@ -245,7 +269,7 @@ fn find_urdf<'a>(
             None
         }
     };
-    (urdf, Lookup { files, folders })
+    (urdf, Lookup::new(files, folders))
 }
 
 /// The words of the command that reading a profile starts: of `xacro`, if its URDF is to be
@@ -303,7 +327,7 @@ pub fn bare(
     )
     .map_err(Unread::faults)?;
     let mut found = Diagnostics::new();
-    let read = foreign::robot::read(&urdf, path, &Lookup { files, folders }, &mut found);
+    let read = foreign::robot::read(&urdf, path, &Lookup::new(files, folders), &mut found);
     found.or(())?;
     let incomplete = || Diagnostic::error("W010", "the robot has no links").in_source(&urdf);
     let read = read.ok_or_else(incomplete)?;

@@ -445,10 +445,7 @@ mod tests {
                 LIMIT,
             ) {
                 Ok(source) => {
-                    let lookup = Lookup {
-                        files: &Files::Disk,
-                        folders: Vec::new(),
-                    };
+                    let lookup = Lookup::new(&Files::Disk, Vec::new());
                     let mut found = Diagnostics::new();
                     foreign::robot::read(&source, Path::new("r.urdf.xacro"), &lookup, &mut found);
                     // Longer messages are cut.

@@ -2,9 +2,11 @@
 //!
 //! Never: reads a file, steps the simulation, or decides anything.
 
+mod appearance;
 mod choice_name;
 mod choice_parts;
 mod choices;
+mod clustered;
 mod facets;
 mod hull;
 mod intervals;
@@ -28,6 +30,7 @@ mod stream;
 mod trace;
 mod tree;
 
+pub use appearance::{Appearances, Colour, SeenLink, SeenPart};
 pub use choice_name::{ChoiceGroup, ChoiceName, OBSTACLE_LIST};
 pub use choice_parts::{ObjectAxis, PlacedObject, PlanarAxis, SightingAxis, StartAxis, WheelAxis};
 pub use choices::{Choice, ChoiceKind, ChoiceValue, Choices};
@@ -58,6 +61,6 @@ pub use trace::{
     PerceivedPlane, PerceivedThing, Percept, Phase, Trace,
 };
 pub use tree::{
-    Amount, Matter, ModelTree, Spread, TreeGeometry, TreeInertial, TreeJoint, TreeLink, TreeMimic,
-    TreeMotion, TreeSolid,
+    Amount, Matter, ModelTree, Spread, TreeColour, TreeGeometry, TreeInertial, TreeJoint, TreeLink,
+    TreeMimic, TreeMotion, TreeSolid,
 };

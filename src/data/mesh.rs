@@ -112,6 +112,40 @@ impl Mesh {
         }
     }
 
+    /// Adds the triangles of another mesh, moved by `placed`.
+    pub(crate) fn append(&mut self, other: &Self, placed: impl Fn([f64; 3]) -> [f64; 3]) {
+        let before = u32::try_from(self.vertices.len()).unwrap_or(u32::MAX);
+        self.vertices
+            .extend(other.vertices.iter().map(|vertex| placed(*vertex)));
+        let shifted = other
+            .triangles
+            .iter()
+            .map(|corners| corners.map(|idx| idx.saturating_add(before)));
+        self.triangles.extend(shifted);
+    }
+
+    /// Removes the vertices that no triangle has.
+    #[must_use]
+    pub fn with_used_vertices(&self) -> Self {
+        let mut places = vec![None; self.vertices.len()];
+        let mut vertices = Vec::new();
+        let mut place = |idx: u32| {
+            *places[idx as usize].get_or_insert_with(|| {
+                vertices.push(self.vertices[idx as usize]);
+                u32::try_from(vertices.len() - 1).unwrap_or(u32::MAX)
+            })
+        };
+        let triangles = self
+            .triangles
+            .iter()
+            .map(|corners| corners.map(&mut place))
+            .collect();
+        Self {
+            vertices,
+            triangles,
+        }
+    }
+
     /// Scales each axis. Reverses the triangles of a mirrored mesh, so that they still face
     /// outwards.
     #[must_use]

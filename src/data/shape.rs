@@ -188,30 +188,38 @@ impl Shape {
 impl Part {
     /// Returns the axis-aligned bounding box in the model's frame: lowest and highest corner.
     pub fn bounds(&self) -> ([f64; 3], [f64; 3]) {
-        let at = self.pose.to_isometry();
-        let centre = at.translation.vector;
-        // Extents along the frame's axes of a unit segment along the shape's z axis, and of a unit
-        // disc across it.
-        let along = (at.rotation * Vector3::z()).abs();
-        let across = along.map(|cosine| (1.0 - cosine * cosine).max(0.0).sqrt());
-        let reach = match &self.shape {
-            Shape::Box { size } => {
-                at.rotation.to_rotation_matrix().matrix().abs() * (Vector3::from(*size) / 2.0)
-            }
-            Shape::Cylinder { radius, height } => along * (height / 2.0) + across * *radius,
-            Shape::Sphere { radius } => Vector3::repeat(*radius),
-            Shape::Capsule { radius, height } => along * (height / 2.0) + Vector3::repeat(*radius),
-            Shape::Tube {
-                radius_low,
-                radius_high,
-                height,
-                ..
-            } => along * (height / 2.0) + across * radius_low.max(*radius_high),
-            Shape::Mesh { mesh } => return around(&at, &mesh.vertices),
-            Shape::Hull { points, .. } => return around(&at, points),
-        };
-        ((centre - reach).into(), (centre + reach).into())
+        bounds_of(&self.shape, &self.pose.to_isometry())
     }
+
+    /// Returns the axis-aligned bounding box in the frame of this pose of the model.
+    pub fn bounds_at(&self, model: &Isometry3<f64>) -> ([f64; 3], [f64; 3]) {
+        bounds_of(&self.shape, &(model * self.pose.to_isometry()))
+    }
+}
+
+fn bounds_of(shape: &Shape, at: &Isometry3<f64>) -> ([f64; 3], [f64; 3]) {
+    let centre = at.translation.vector;
+    // Extents along the frame's axes of a unit segment along the shape's z axis, and of a unit
+    // disc across it.
+    let along = (at.rotation * Vector3::z()).abs();
+    let across = along.map(|cosine| (1.0 - cosine * cosine).max(0.0).sqrt());
+    let reach = match shape {
+        Shape::Box { size } => {
+            at.rotation.to_rotation_matrix().matrix().abs() * (Vector3::from(*size) / 2.0)
+        }
+        Shape::Cylinder { radius, height } => along * (height / 2.0) + across * *radius,
+        Shape::Sphere { radius } => Vector3::repeat(*radius),
+        Shape::Capsule { radius, height } => along * (height / 2.0) + Vector3::repeat(*radius),
+        Shape::Tube {
+            radius_low,
+            radius_high,
+            height,
+            ..
+        } => along * (height / 2.0) + across * radius_low.max(*radius_high),
+        Shape::Mesh { mesh } => return around(at, &mesh.vertices),
+        Shape::Hull { points, .. } => return around(at, points),
+    };
+    ((centre - reach).into(), (centre + reach).into())
 }
 
 fn around(at: &Isometry3<f64>, points: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {

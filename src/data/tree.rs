@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
-use crate::{Mesh, Shape};
+use crate::{Colour, Mesh, Shape};
 use actcheck_base::SourceSpan;
 
 /// The links and joints of a model, as its file states them. Names of links and of joints are
@@ -64,8 +64,21 @@ pub struct TreeSolid {
     pub matter: Option<Matter>,
     /// Sliding friction coefficient.
     pub friction: Option<f64>,
+    /// The colour that the model's file gives it.
+    pub colour: Option<TreeColour>,
     /// The element of the shape.
     pub place: SourceSpan,
+}
+
+/// The colour of a shape.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TreeColour {
+    /// The colour of all of it.
+    Whole(Colour),
+    /// The colour of what has none of its own in the file of a mesh.
+    Rest(Colour),
+    /// It is invisible.
+    Clear,
 }
 
 /// The basis of a mass.

@@ -6,6 +6,8 @@ mod contacts;
 mod formats;
 mod html;
 mod json;
+#[cfg(test)]
+mod made_up;
 mod moment;
 mod picture;
 mod pressed;

@@ -277,53 +277,8 @@ mod tests {
 
     use std::collections::BTreeMap;
 
-    use actcheck_data::{ActionTrace, ContactEpisode, Pose, RobotState, Snapshot};
-
-    fn body(id: &str, fixed: bool, rests_on: &str) -> BodyState {
-        BodyState {
-            id: id.to_owned(),
-            model: String::new(),
-            category: String::new(),
-            fixed,
-            pose: Pose::IDENTITY,
-            linear_velocity: [0.0; 3],
-            angular_velocity: [0.0; 3],
-            aabb_min: [0.0; 3],
-            aabb_max: [0.0; 3],
-            mass_kg: 1.0,
-            friction: 0.5,
-            restitution: 0.0,
-            touches: Vec::new(),
-            rests_on: vec![rests_on.to_owned()],
-            asleep: false,
-            size_m: [0.1; 3],
-            grasp_distance_m: None,
-            part: None,
-            left_world: false,
-        }
-    }
-
-    fn snapshot(time_secs: f64) -> Snapshot {
-        let robot = RobotState {
-            base_true: [0.0; 3],
-            base_believed: [0.0; 3],
-            joints: Vec::new(),
-            gripper: Pose::IDENTITY,
-            gripper_opening_m: 0.0,
-            left_touches: Vec::new(),
-            right_touches: Vec::new(),
-            links: Vec::new(),
-            cup: None,
-        };
-        Snapshot {
-            time_secs,
-            bodies: vec![
-                body("table_1", true, "floor"),
-                body("glass_1", false, "table_1"),
-            ],
-            robot,
-        }
-    }
+    use crate::made_up::snapshot;
+    use actcheck_data::{ActionTrace, ContactEpisode};
 
     /// A pick of `glass_1` on `table_1` from 2 s to 12 s, in which the robot touched things for a
     /// second each.

@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs, clippy::unwrap_used)]
 
+mod appearance;
 mod assumed;
 mod body;
 mod counterweight;

@@ -80,7 +80,8 @@ pub use actcheck_geometry::{
 pub use actcheck_robot::{
     BalancedJoint, Completed, Dynamics, FingerJoint, GRAVITY, Gripper, GripperFault, Joint,
     JointKind, Kinematics, Layout, Proposal, Robot, RobotBody, RobotError, RobotMeasures,
-    SelfContact, UNKNOWN_EFFORT, UNKNOWN_SPEEDS, UnknownHand, complete, geometry, ik, propose,
+    RobotModel, SelfContact, UNKNOWN_EFFORT, UNKNOWN_SPEEDS, UnknownHand, complete, geometry, ik,
+    propose,
 };
 
 /// Version of the physics: the same scene and commands give the same bits only with the same

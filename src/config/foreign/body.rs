@@ -9,7 +9,8 @@ use crate::foreign::frames::Frame;
 use crate::foreign::solid_mass::SolidMass;
 use actcheck_base::names;
 use actcheck_data::{
-    Inertia, MovingPart, ObjectModel, Part, PartJoint, Pose, Shape, Surface, bounds,
+    Inertia, MovingPart, ObjectModel, Part, PartJoint, Pose, SeenLink, SeenPart, Shape, Surface,
+    bounds,
 };
 
 /// Density of a body without a mass: that of water, SDF's default. Unit: kg/m³.
@@ -50,6 +51,8 @@ pub(crate) struct SdfModel {
 #[derive(Default)]
 pub(crate) struct Body {
     pub(crate) parts: Vec<Part>,
+    /// What it looks like, if visual shapes are read.
+    pub(crate) seen: SeenLink,
     /// Masses of the links that state one.
     pub(crate) masses: Vec<Mass>,
     /// Whether a link with shapes has no mass.
@@ -89,12 +92,8 @@ impl Body {
         digest: String,
         pose: &Isometry3<f64>,
     ) -> ObjectModel {
-        let everything: Vec<Part> = self.all().flat_map(|body| body.placed(pose)).collect();
-        let (low, high) = bounds(&everything);
-        let foot = Vector3::new((low.x + high.x) / 2.0, (low.y + high.y) / 2.0, low.z);
-        let model_from_file = Translation3::from(-foot) * pose;
+        let (model_from_file, size) = self.frame(pose);
         let parts = self.placed(&model_from_file);
-        let size = high - low;
         let surface = surface(&parts, bounds(&parts).1.z);
         let by_volume = DENSITY * parts.iter().map(|part| part.shape.volume()).sum::<f64>();
         let stated: f64 = self.masses.iter().map(|mass| mass.kg).sum();
@@ -124,10 +123,27 @@ impl Body {
         }
     }
 
+    /// Returns what the model at this pose looks like, without the bodies that joints move; `None`
+    /// if it looks like its collision shapes. Frame: the model's.
+    pub(crate) fn seen_in_model(mut self, pose: &Isometry3<f64>) -> Option<Vec<SeenPart>> {
+        let (model_from_file, _) = self.frame(pose);
+        self.seen.transform(&model_from_file);
+        self.seen.has_look.then_some(self.seen.parts)
+    }
+
+    /// The transform from the file's frame to that of a model at this pose, and its dimensions.
+    fn frame(&self, pose: &Isometry3<f64>) -> (Isometry3<f64>, Vector3<f64>) {
+        let everything: Vec<Part> = self.all().flat_map(|body| body.placed(pose)).collect();
+        let (low, high) = bounds(&everything);
+        let foot = Vector3::new((low.x + high.x) / 2.0, (low.y + high.y) / 2.0, low.z);
+        (Translation3::from(-foot) * pose, high - low)
+    }
+
     /// Adds the solids and masses of a body that moves with this one. The material is that of the
     /// first.
     pub(crate) fn add(&mut self, other: Self) {
         self.parts.extend(other.parts);
+        self.seen.add(other.seen);
         self.masses.extend(other.masses);
         self.has_unknown_mass |= other.has_unknown_mass;
         self.has_usual_friction |= other.has_usual_friction;
@@ -139,6 +155,7 @@ impl Body {
     pub(crate) fn transform(&mut self, by: &Isometry3<f64>) {
         let turn = by.rotation.to_rotation_matrix();
         self.parts = self.placed(by);
+        self.seen.transform(by);
         for mass in &mut self.masses {
             mass.com = (by * Point3::from(mass.com)).coords;
             mass.about_com = mass

@@ -7,10 +7,11 @@ use std::rc::Rc;
 
 use nalgebra::{Isometry3, Matrix4, Point3, Rotation3, Unit, Vector3};
 
-use crate::foreign::mesh_file::{MOST_TRIANGLES, checked};
+use crate::foreign::colours;
+use crate::foreign::mesh_file::{ColouredMesh, ColouredTriangles, MOST_TRIANGLES};
 use crate::foreign::xml::{self, Node};
 use actcheck_base::{Diagnostic, Diagnostics, Source};
-use actcheck_data::Mesh;
+use actcheck_data::Colour;
 
 /// Limits on the depth and the number of nodes; only nodes that instance each other in a cycle
 /// exceed them.
@@ -28,7 +29,10 @@ const LONGEST_TRANSFORM: usize = 1_000;
 ///
 /// # Errors
 /// W031 if it is not XML, W037 if it has no usable geometry.
-pub(crate) fn read(source: &Source, warnings: &mut Diagnostics) -> Result<Mesh, Diagnostics> {
+pub(crate) fn read(
+    source: &Source,
+    warnings: &mut Diagnostics,
+) -> Result<ColouredMesh, Diagnostics> {
     let document = xml::parse(source, &source.text)?;
     let root = document.root_element();
     let fault = |node: Node, reason: String| -> Diagnostics {
@@ -67,12 +71,12 @@ pub(crate) fn read(source: &Source, warnings: &mut Diagnostics) -> Result<Mesh, 
         );
     }
     let unit = unit(root);
-    let vertices = gathering
-        .vertices
-        .iter()
-        .map(|vertex| vertex.map(|x| x * unit))
-        .collect();
-    checked(vertices, gathering.triangles).map_err(|reason| fault(root, reason.to_string()))
+    let mut all = gathering.all;
+    for vertex in &mut all.vertices {
+        *vertex = vertex.map(|x| x * unit);
+    }
+    all.checked()
+        .map_err(|reason| fault(root, reason.to_string()))
 }
 
 /// Returns the length of one unit of the file in metres.
@@ -89,9 +93,11 @@ type Fault<'a> = (Node<'a>, String);
 
 /// A geometry in its own frame: its positions, and its triangles as indices of them. Unit: the
 /// file's.
-struct Geometry {
+struct Geometry<'a> {
     positions: Vec<Point3<f64>>,
     triangles: Vec<[usize; 3]>,
+    /// The symbol of the material of all triangles from one on, until the next entry.
+    materials: Vec<(usize, Option<&'a str>)>,
 }
 
 /// The scene's triangles so far, in the file's unit.
@@ -100,9 +106,8 @@ struct SceneTriangles<'a> {
     /// Elements by kind and id; the first of several.
     by_id: BTreeMap<(&'a str, &'a str), Node<'a>>,
     /// Geometries that were read, by element: a scene may instance one thousands of times.
-    known: BTreeMap<Node<'a>, Rc<Geometry>>,
-    vertices: Vec<[f64; 3]>,
-    triangles: Vec<[u32; 3]>,
+    known: BTreeMap<Node<'a>, Rc<Geometry<'a>>>,
+    all: ColouredTriangles,
     depth: usize,
     n_nodes: usize,
 }
@@ -119,8 +124,7 @@ impl<'a> SceneTriangles<'a> {
             root,
             by_id,
             known: BTreeMap::new(),
-            vertices: Vec::new(),
-            triangles: Vec::new(),
+            all: ColouredTriangles::default(),
             depth: 0,
             n_nodes: 0,
         }
@@ -151,7 +155,7 @@ impl<'a> SceneTriangles<'a> {
                 geometries
                     .collect::<Vec<_>>()
                     .into_iter()
-                    .try_for_each(|node| self.geometry(node, &identity))
+                    .try_for_each(|node| self.geometry(node, None, &identity))
             }
         }
     }
@@ -175,7 +179,7 @@ impl<'a> SceneTriangles<'a> {
                 }
                 "instance_geometry" => {
                     let geometry = self.target(inner, "geometry")?;
-                    self.geometry(geometry, &at)?;
+                    self.geometry(geometry, Some(inner), &at)?;
                 }
                 "instance_controller" => {
                     return Err((
@@ -203,8 +207,13 @@ impl<'a> SceneTriangles<'a> {
             .ok_or_else(|| (instance, format!("there is no `<{kind} id=\"{id}\">`")))
     }
 
-    /// Adds a geometry to the scene.
-    fn geometry(&mut self, node: Node<'a>, at: &Matrix4<f64>) -> Result<(), Fault<'a>> {
+    /// Adds a geometry to the scene, with the colours that its instance gives to its materials.
+    fn geometry(
+        &mut self,
+        node: Node<'a>,
+        instance: Option<Node<'a>>,
+        at: &Matrix4<f64>,
+    ) -> Result<(), Fault<'a>> {
         let geometry = match self.known.get(&node) {
             Some(known) => Rc::clone(known),
             None => {
@@ -213,14 +222,14 @@ impl<'a> SceneTriangles<'a> {
                 read
             }
         };
-        let before = self.vertices.len();
+        let before = self.all.vertices.len();
         if before + geometry.positions.len() > MOST_VERTICES {
             return Err((
                 node,
                 format!("its instances have more than {MOST_VERTICES} vertices"),
             ));
         }
-        if self.triangles.len() + geometry.triangles.len() > MOST_TRIANGLES {
+        if self.all.triangles.len() + geometry.triangles.len() > MOST_TRIANGLES {
             return Err((
                 node,
                 format!("its instances have more than {MOST_TRIANGLES} triangles"),
@@ -230,21 +239,49 @@ impl<'a> SceneTriangles<'a> {
             .positions
             .iter()
             .map(|position| <[f64; 3]>::from(at.transform_point(position).coords));
-        self.vertices.extend(placed);
-        for corners in &geometry.triangles {
-            let narrow = corners.map(|corner| u32::try_from(corner + before));
-            let [Ok(a), Ok(b), Ok(c)] = narrow else {
-                return Err((node, "it is too large".to_owned()));
-            };
-            self.triangles.push([a, b, c]);
+        self.all.vertices.extend(placed);
+        let ends = geometry.materials.iter().skip(1).map(|(start, _)| *start);
+        let ends = ends.chain([geometry.triangles.len()]);
+        for ((start, symbol), end) in geometry.materials.iter().zip(ends) {
+            let colour = symbol.and_then(|symbol| self.colour(symbol, instance));
+            self.all.begin(colour);
+            for corners in &geometry.triangles[*start..end] {
+                let narrow = corners.map(|corner| u32::try_from(corner + before));
+                let [Ok(a), Ok(b), Ok(c)] = narrow else {
+                    return Err((node, "it is too large".to_owned()));
+                };
+                self.all.triangles.push([a, b, c]);
+            }
         }
         Ok(())
     }
 
-    fn read_geometry(&self, node: Node<'a>) -> Result<Geometry, Fault<'a>> {
+    /// The colour in diffuse light of a material, which an instance of its geometry binds to its
+    /// symbol. `None` if it has none, or a texture, which is not read.
+    fn colour(&self, symbol: &str, instance: Option<Node<'a>>) -> Option<Colour> {
+        let bound = instance.and_then(|instance| {
+            instance.descendants().find(|node| {
+                node.tag_name().name() == "instance_material"
+                    && node.attribute("symbol") == Some(symbol)
+            })
+        });
+        let id = match bound {
+            Some(bound) => bound.attribute("target")?.trim_start_matches('#'),
+            None => symbol,
+        };
+        let material = self.by_id.get(&("material", id))?;
+        let effect = self.target(xml::child(*material, "instance_effect")?, "effect");
+        let diffuse = effect.ok()?.descendants();
+        let mut diffuse = diffuse.filter(|node| node.tag_name().name() == "diffuse");
+        let numbers = colours::numbers(xml::text(xml::child(diffuse.next()?, "color")?))?;
+        Some(Colour::of_srgb(*numbers.first_chunk()?))
+    }
+
+    fn read_geometry(&self, node: Node<'a>) -> Result<Geometry<'a>, Fault<'a>> {
         let mut geometry = Geometry {
             positions: Vec::new(),
             triangles: Vec::new(),
+            materials: Vec::new(),
         };
         let Some(mesh) = xml::child(node, "mesh") else {
             return Ok(geometry);
@@ -262,7 +299,7 @@ impl<'a> SceneTriangles<'a> {
     }
 
     /// Adds triangles, or polygons, fans and strips as triangles.
-    fn primitive(&self, primitive: Node<'a>, geometry: &mut Geometry) -> Result<(), Fault<'a>> {
+    fn primitive(&self, primitive: Node<'a>, geometry: &mut Geometry<'a>) -> Result<(), Fault<'a>> {
         if let Some(holes) = xml::child(primitive, "ph") {
             return Err((holes, "polygons with holes are not supported".to_owned()));
         }
@@ -301,6 +338,9 @@ impl<'a> SceneTriangles<'a> {
             ));
         }
         geometry.positions.extend(positions);
+        geometry
+            .materials
+            .push((geometry.triangles.len(), primitive.attribute("material")));
         let pieces = pieces(primitive, &lists)?;
         let is_strip = primitive.tag_name().name() == "tristrips";
         for piece in pieces {
@@ -482,7 +522,8 @@ mod tests {
                 primitive.replace("INPUT", input),
             );
             let source = Source::new("square.dae".to_owned(), text);
-            let mesh = read(&source, &mut Diagnostics::new()).map_err(|found| found.to_string())?;
+            let read = read(&source, &mut Diagnostics::new()).map_err(|found| found.to_string())?;
+            let mesh = read.mesh;
             let corner = |idx: u32| mesh.vertices[idx as usize];
             Ok::<_, String>(
                 mesh.triangles

@@ -1,5 +1,6 @@
 //! Finds and reads SDF, URDF and MJCF models in a folder with Gazebo's or MuJoCo's layout.
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
 use nalgebra::Isometry3;
@@ -17,7 +18,7 @@ use crate::foreign::{mjcf, root_name, sdf, tree_object, urdf};
 use actcheck_base::{
     Diagnostic, Diagnostics, FileFault, Files, Severity, Source, did_you_mean, xml_text,
 };
-use actcheck_data::ObjectModel;
+use actcheck_data::{ObjectModel, SeenPart};
 
 /// A model found in a folder.
 #[derive(Debug, Clone)]
@@ -71,6 +72,37 @@ pub(crate) struct Read {
 /// (W035), an unusable mesh (W037), no solid shape (W038), or an included model that is missing or
 /// has faults (W040).
 pub(crate) fn read(found: &Found, lookup: &Lookup) -> Result<Read, Diagnostics> {
+    let (sdf, pose, warnings) = placed(found, lookup)?;
+    let has_pose = pose != Isometry3::identity();
+    Ok(Read {
+        model: sdf.body.into_model(&found.name, sdf.digest, &pose),
+        has_pose,
+        warnings,
+    })
+}
+
+/// Reads what a model looks like, without its moving parts. Frame: the model's. Faults of visual
+/// shapes are reported as warnings. `None` if it looks like its collision shapes, or can't be read.
+pub(crate) fn seen(
+    found: &Found,
+    files: &Files,
+    folders: &[PathBuf],
+    faults: &mut Diagnostics,
+) -> Option<Vec<SeenPart>> {
+    let lookup = Lookup {
+        looks: Some(RefCell::default()),
+        ..Lookup::new(files, folders.to_vec())
+    };
+    let (sdf, pose, _) = placed(found, &lookup).ok()?;
+    faults.extend(lookup.looks.map(RefCell::into_inner).unwrap_or_default());
+    sdf.body.seen_in_model(&pose)
+}
+
+/// Reads a model, with its pose in scenes and warnings.
+fn placed(
+    found: &Found,
+    lookup: &Lookup,
+) -> Result<(SdfModel, Isometry3<f64>, Diagnostics), Diagnostics> {
     let source = Opened::of(found, lookup)?;
     let (sdf, warnings) = match source.format {
         Format::Sdf => {
@@ -85,12 +117,7 @@ pub(crate) fn read(found: &Found, lookup: &Lookup) -> Result<Read, Diagnostics> 
     } else {
         turned(turn) * sdf.pose
     };
-    let has_pose = pose != Isometry3::identity();
-    Ok(Read {
-        model: sdf.body.into_model(&found.name, sdf.digest, &pose),
-        has_pose,
-        warnings,
-    })
+    Ok((sdf, pose, warnings))
 }
 
 /// A model's file.

@@ -7,6 +7,7 @@ use std::path::Path;
 use crate::foreign::inclusions::Inclusions;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::mesh_file;
+use crate::foreign::seen::SeenShapes;
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostic, Diagnostics, Digest, SourceSpan};
 use actcheck_data::{Mesh, ModelTree, Shape, TreeGeometry, TreeSolid};
@@ -22,6 +23,8 @@ pub(crate) struct Shapes<'a> {
     pub(crate) inclusions: Inclusions,
     /// Warnings about mesh files without a text, each of which is given once.
     pub(crate) warned: BTreeSet<String>,
+    /// The reader of visual shapes, if they are to be read.
+    pub(crate) seen: Option<SeenShapes<'a>>,
 }
 
 /// Help text with the supported kinds of geometry.
@@ -35,6 +38,7 @@ impl<'a> Shapes<'a> {
             digest: Digest::new(),
             inclusions: Inclusions::default(),
             warned: BTreeSet::new(),
+            seen: lookup.looks.as_ref().map(|_| SeenShapes::new(lookup, path)),
         }
     }
 
@@ -151,10 +155,7 @@ impl<'a> Shapes<'a> {
     }
 
     fn mesh_file(&self, uri: &str) -> Result<mesh_file::MeshFile, Diagnostics> {
-        let path = self.lookup.resolve(uri, self.path).map_err(|reason| {
-            Diagnostic::error("W037", format!("cannot find the mesh `{uri}`: {reason}"))
-                .help(mesh_file::HOW_TO_NAME)
-        })?;
+        let path = mesh_file::find(self.lookup, self.path, uri)?;
         mesh_file::read(self.lookup.files, &path)
     }
 }
@@ -184,7 +185,12 @@ pub(crate) fn check_scale(
 }
 
 /// Whether a scaled mesh is not too large. Otherwise reports W034 at a place.
-fn check_reach(mesh: &Mesh, scale: [f64; 3], place: &SourceSpan, found: &mut Diagnostics) -> bool {
+pub(crate) fn check_reach(
+    mesh: &Mesh,
+    scale: [f64; 3],
+    place: &SourceSpan,
+    found: &mut Diagnostics,
+) -> bool {
     let along = |vertex: &[f64; 3]| {
         let scaled = vertex.iter().zip(&scale);
         scaled.fold(0.0_f64, |most, (along, by)| most.max((along * by).abs()))

@@ -20,9 +20,11 @@ use crate::foreign::gltf_document::{
     Accessor, BufferView, Document, GltfNode, Primitive, harmless_extension,
 };
 use crate::foreign::lookup;
-use crate::foreign::mesh_file::{MOST_TRIANGLES, MeshFileFault, checked};
+use crate::foreign::mesh_file::{
+    ColouredMesh, ColouredTriangles, MOST_TRIANGLES, MeshFileFault, WHITE,
+};
 use actcheck_base::{Diagnostic, Diagnostics, FileFault, Files};
-use actcheck_data::Mesh;
+use actcheck_data::Colour;
 
 /// Largest number of vertices with those of all instances, used or not.
 const MOST_VERTICES: usize = 3 * MOST_TRIANGLES;
@@ -89,7 +91,7 @@ pub(crate) enum GltfFault {
 
 /// A mesh of a glTF file.
 pub(crate) struct GltfMesh {
-    pub(crate) mesh: Mesh,
+    pub(crate) mesh: ColouredMesh,
     /// The bytes of its buffers in other files, for digests.
     pub(crate) others: Vec<u8>,
 }
@@ -117,8 +119,7 @@ pub(crate) fn read(
     let mut gathering = GltfTriangles {
         document: &document,
         known: BTreeMap::new(),
-        vertices: Vec::new(),
-        triangles: Vec::new(),
+        all: ColouredTriangles::default(),
         has_lines: false,
     };
     gathering.scene(&mut buffers)?;
@@ -136,7 +137,7 @@ pub(crate) fn read(
         );
     }
     Ok(GltfMesh {
-        mesh: checked(gathering.vertices, gathering.triangles)?,
+        mesh: gathering.all.checked()?,
         others: buffers.others,
     })
 }
@@ -265,6 +266,8 @@ impl Buffers<'_> {
 struct GltfGeometry {
     positions: Vec<Point3<f64>>,
     triangles: Vec<[usize; 3]>,
+    /// The colour of all triangles from one on, until the next entry.
+    colours: Vec<(usize, Option<Colour>)>,
 }
 
 /// The scene's triangles so far. Unit: metres.
@@ -272,8 +275,7 @@ struct GltfTriangles<'a> {
     document: &'a Document,
     /// Meshes that were read, by index: a scene may instance one thousands of times.
     known: BTreeMap<usize, Rc<GltfGeometry>>,
-    vertices: Vec<[f64; 3]>,
-    triangles: Vec<[u32; 3]>,
+    all: ColouredTriangles,
     /// Whether a mesh has points or lines.
     has_lines: bool,
 }
@@ -338,9 +340,9 @@ impl GltfTriangles<'_> {
                 read
             }
         };
-        let before = self.vertices.len();
+        let before = self.all.vertices.len();
         if before + geometry.positions.len() > MOST_VERTICES
-            || self.triangles.len() + geometry.triangles.len() > MOST_TRIANGLES
+            || self.all.triangles.len() + geometry.triangles.len() > MOST_TRIANGLES
         {
             return Err(GltfFault::Large);
         }
@@ -350,16 +352,21 @@ impl GltfTriangles<'_> {
             .positions
             .iter()
             .map(|position| <[f64; 3]>::from(linear * position.coords + shift));
-        self.vertices.extend(placed);
+        self.all.vertices.extend(placed);
         // A node that mirrors its mesh turns its triangles round.
         let is_mirrored = linear.determinant() < 0.0;
-        for [a, b, c] in &geometry.triangles {
-            let corners = if is_mirrored { [a, c, b] } else { [a, b, c] };
-            let narrow = corners.map(|corner| u32::try_from(corner + before));
-            let [Ok(a), Ok(b), Ok(c)] = narrow else {
-                return Err(GltfFault::Large);
-            };
-            self.triangles.push([a, b, c]);
+        let ends = geometry.colours.iter().skip(1).map(|(start, _)| *start);
+        let ends = ends.chain([geometry.triangles.len()]);
+        for ((start, colour), end) in geometry.colours.iter().zip(ends) {
+            self.all.begin(*colour);
+            for [a, b, c] in &geometry.triangles[*start..end] {
+                let corners = if is_mirrored { [a, c, b] } else { [a, b, c] };
+                let narrow = corners.map(|corner| u32::try_from(corner + before));
+                let [Ok(a), Ok(b), Ok(c)] = narrow else {
+                    return Err(GltfFault::Large);
+                };
+                self.all.triangles.push([a, b, c]);
+            }
         }
         Ok(())
     }
@@ -373,6 +380,7 @@ impl GltfTriangles<'_> {
         let mut geometry = GltfGeometry {
             positions: Vec::new(),
             triangles: Vec::new(),
+            colours: Vec::new(),
         };
         for primitive in &mesh.primitives {
             match primitive.mode {
@@ -476,6 +484,9 @@ fn read_primitive(
     if geometry.triangles.len() + triangles.len() > MOST_TRIANGLES {
         return Err(GltfFault::Large);
     }
+    geometry
+        .colours
+        .push((geometry.triangles.len(), document.colour(primitive)));
     let shifted = triangles
         .into_iter()
         .map(|corners| corners.map(|corner| corner + before));
@@ -706,6 +717,21 @@ impl AccessorElements {
 }
 
 impl Document {
+    /// The colour of a primitive's material; `None` if it has none, or a texture, which is not
+    /// read. Faults of materials are no faults of their mesh.
+    fn colour(&self, primitive: &Primitive) -> Option<Colour> {
+        let idx = usize::try_from(primitive.material.as_ref()?.as_u64()?).ok()?;
+        let material = self.materials.as_ref()?.get(idx)?;
+        let factor = material.pointer("/pbrMetallicRoughness/baseColorFactor");
+        let channel = |idx: usize| factor?.get(idx)?.as_f64();
+        let channels = [0, 1, 2].map(|idx| channel(idx).unwrap_or(1.0));
+        let colour = Colour::of_linear(channels);
+        let is_textured = material
+            .pointer("/pbrMetallicRoughness/baseColorTexture")
+            .is_some();
+        (!is_textured || colour != WHITE).then_some(colour)
+    }
+
     fn accessor(&self, idx: usize) -> Result<&Accessor, GltfFault> {
         let accessor = self.accessors.get(idx);
         accessor.ok_or(GltfFault::Missing("accessor", idx))
@@ -727,6 +753,7 @@ impl Document {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use actcheck_data::Mesh;
 
     /// The JSON of a tetrahedron with its corner at the origin and edges of 1 m along the axes, in
     /// a buffer of 48 bytes of positions, and 12 indices of one byte. `$` is replaced.
@@ -777,7 +804,7 @@ mod tests {
     fn of_bytes(bytes: &[u8]) -> Result<Mesh, String> {
         let mut warnings = Diagnostics::new();
         let read = read(&Files::Disk, Path::new("m.glb"), bytes, &mut warnings);
-        read.map(|read| read.mesh)
+        read.map(|read| read.mesh.mesh)
             .map_err(|fault| fault.to_string())
     }
 
@@ -962,7 +989,7 @@ mod tests {
             let mut warnings = Diagnostics::new();
             let path = folder.path().join("m.gltf");
             read(&Files::Disk, &path, json.as_bytes(), &mut warnings)
-                .map(|read| (shape(&read.mesh).2, read.others.len()))
+                .map(|read| (shape(&read.mesh.mesh).2, read.others.len()))
                 .map_err(|fault| fault.to_string())
         };
         for (uri, others) in [

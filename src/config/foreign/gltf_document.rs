@@ -1,4 +1,4 @@
-//! The JSON of a glTF 2.0 file, as far as it determines a collision mesh; the rest is skipped.
+//! The JSON of a glTF 2.0 file, as far as it determines a mesh and its colours; the rest is skipped.
 //!
 //! Source: glTF 2.0 Specification, section 5, "Properties Reference".
 
@@ -7,6 +7,7 @@ use std::marker::PhantomData;
 
 use serde::de::{Error, IgnoredAny, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer};
+use serde_json::Value;
 
 /// Largest number of elements in a list of JSON: more could exhaust memory.
 const MOST_ELEMENTS: usize = 100_000;
@@ -49,6 +50,8 @@ pub(super) struct Document {
     pub(super) buffer_views: Vec<BufferView>,
     #[serde(default, deserialize_with = "few")]
     pub(super) buffers: Vec<Buffer>,
+    /// As they are: those with faults do not make a file unusable.
+    pub(super) materials: Option<Value>,
     #[serde(default, deserialize_with = "few")]
     pub(super) extensions_required: Vec<String>,
 }
@@ -100,6 +103,7 @@ pub(super) struct Mesh {
 pub(super) struct Primitive {
     pub(super) attributes: VertexAttributes,
     pub(super) indices: Option<u32>,
+    pub(super) material: Option<Value>,
     #[serde(default = "triangles")]
     pub(super) mode: u32,
     /// The number of morph targets.

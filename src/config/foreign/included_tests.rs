@@ -20,10 +20,7 @@ impl Folder {
     }
 
     fn lookup(&self) -> Lookup<'static> {
-        Lookup {
-            files: &Files::Disk,
-            folders: vec![self.0.path().join("m")],
-        }
+        Lookup::new(&Files::Disk, vec![self.0.path().join("m")])
     }
 
     /// Reads the object of a file, with its warnings.

@@ -1,8 +1,9 @@
 //! Resolves the URIs in models to files.
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 
-use actcheck_base::Files;
+use actcheck_base::{Diagnostics, Files};
 
 /// Why a URI does not lead to a file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -21,9 +22,20 @@ pub(crate) enum UriFault {
 pub(crate) struct Lookup<'a> {
     pub(crate) files: &'a Files,
     pub(crate) folders: Vec<PathBuf>,
+    /// The faults of visual shapes if these are to be read, too.
+    pub(crate) looks: Option<RefCell<Diagnostics>>,
 }
 
-impl Lookup<'_> {
+impl<'a> Lookup<'a> {
+    /// Looks up files of models that are simulated: visual shapes are not read.
+    pub(crate) fn new(files: &'a Files, folders: Vec<PathBuf>) -> Self {
+        Self {
+            files,
+            folders,
+            looks: None,
+        }
+    }
+
     /// Returns the path of a URI in a file. A URI without a scheme is relative to that file or, if
     /// nothing is there, to one of the folders. If the path as written does not exist, its other
     /// [`spellings`] are tried.
@@ -278,10 +290,7 @@ mod tests {
             std::fs::create_dir_all(path.parent().expect("a folder")).expect("a folder");
             std::fs::write(path, "").expect("a file");
         }
-        let lookup = Lookup {
-            files: &Files::Disk,
-            folders: vec![root.to_path_buf()],
-        };
+        let lookup = Lookup::new(&Files::Disk, vec![root.to_path_buf()]);
         let found = |uri: &str| {
             lookup
                 .resolve(uri, &written)

@@ -8,11 +8,12 @@ use nalgebra::{
     Isometry3, Matrix3, Point3, Quaternion, Rotation3, Translation3, Unit, UnitQuaternion, Vector3,
 };
 
+use crate::foreign::colours;
 use crate::foreign::lookup::beside;
 use crate::foreign::mjcf_budget::Budget;
 use crate::foreign::xml::{self, Bound, Node, Pieces, Reader};
 use actcheck_base::{Diagnostic, Diagnostics, Files, Source, did_you_mean};
-use actcheck_data::{Spread, TreeInertial};
+use actcheck_data::{Spread, TreeColour, TreeInertial};
 
 /// Most files in a chain of inclusions: a longer chain comes back to its first file.
 const DEEPEST: usize = 8;
@@ -72,6 +73,8 @@ pub(super) struct Compiler {
     defaults: BTreeMap<String, BTreeMap<String, Values>>,
     /// By the mesh's name.
     pub(super) meshes: BTreeMap<String, Rc<MeshAsset>>,
+    /// The colours of materials, by their names.
+    pub(super) materials: BTreeMap<String, TreeColour>,
     /// Files of other models, by their names.
     pub(super) models: BTreeMap<String, String>,
     /// Geoms that a `<pair>` lets collide.
@@ -82,6 +85,24 @@ pub(super) struct Compiler {
     limits_itself: bool,
     /// Whether primitives are fitted to the boxes around meshes instead of to their moments.
     pub(super) fits_boxes: bool,
+}
+
+/// The colour in `rgba`. Reports one that is not four numbers (W036).
+fn own_colour(
+    node: Node,
+    attributes: &MjcfAttributes<'_>,
+    reader: &mut Reader,
+) -> Option<TreeColour> {
+    let text = attributes.get("rgba")?;
+    let numbers = colours::numbers(text).filter(|numbers| numbers.len() == 4);
+    if numbers.is_none() {
+        let message = format!(
+            "`rgba` is ignored: it must be four numbers, but is `{}`",
+            xml::short(text)
+        );
+        reader.warning("W036", node, message, colours::NO_EFFECT);
+    }
+    colours::whole(&numbers?)
 }
 
 /// A mesh of a file.
@@ -212,6 +233,7 @@ impl Compiler {
             euler: "xyz".to_owned(),
             defaults: BTreeMap::new(),
             meshes: BTreeMap::new(),
+            materials: BTreeMap::new(),
             models: BTreeMap::new(),
             paired: BTreeSet::new(),
             masses: MassRules::default(),
@@ -232,6 +254,7 @@ impl Compiler {
         for asset in sections("asset") {
             match asset.tag_name().name() {
                 "mesh" => compiler.add_mesh(asset, &folders, reader),
+                "material" => compiler.add_material(asset, reader),
                 "model" => compiler.add_model(asset, reader),
                 _ => {}
             }
@@ -349,6 +372,28 @@ impl Compiler {
         }
         mesh.file = file;
         self.meshes.insert(name, Rc::new(mesh));
+    }
+
+    fn add_material(&mut self, node: Node, reader: &mut Reader) {
+        let attributes = self.attributes(node, None);
+        if let (Some(name), Some(colour)) = (
+            node.attribute("name"),
+            own_colour(node, &attributes, reader),
+        ) {
+            self.materials.insert(name.to_owned(), colour);
+        }
+    }
+
+    /// Returns the colour of a geom: its own, or that of its material. MuJoCo does not read the
+    /// colours of mesh files.
+    pub(super) fn colour(
+        &self,
+        geom: Node,
+        attributes: &MjcfAttributes<'_>,
+        reader: &mut Reader,
+    ) -> Option<TreeColour> {
+        own_colour(geom, attributes, reader)
+            .or_else(|| self.materials.get(attributes.get("material")?).copied())
     }
 
     fn add_model(&mut self, node: Node, reader: &mut Reader) {

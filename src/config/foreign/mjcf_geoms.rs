@@ -97,6 +97,7 @@ impl<'a> Model<'a> {
             friction: attributes
                 .number("friction", reader)
                 .map(|sliding| sliding.max(0.0)),
+            colour: self.compiler.colour(geom, attributes, reader),
             place: reader.place(geom),
         })
     }

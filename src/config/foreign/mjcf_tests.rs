@@ -19,10 +19,7 @@ fn with_first<T>(
     read: impl FnOnce(&Source, &Path, &Lookup) -> Result<T, Diagnostics>,
 ) -> Result<T, String> {
     let folder = folder("", files);
-    let lookup = Lookup {
-        files: &Files::Disk,
-        folders: Vec::new(),
-    };
+    let lookup = Lookup::new(&Files::Disk, Vec::new());
     let source = Source::new(files[0].0, files[0].1.to_owned());
     read(&source, &folder.path().join(files[0].0), &lookup).map_err(|faults| faults.to_string())
 }

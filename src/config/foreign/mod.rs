@@ -8,6 +8,7 @@ mod assembly;
 mod body;
 mod building;
 mod collada;
+mod colours;
 mod elements;
 #[cfg(test)]
 mod files_for_tests;
@@ -56,6 +57,9 @@ mod sdf_robot_model;
 mod sdf_robot_tests;
 mod sdf_robot_tree;
 mod sdf_surface;
+mod seen;
+#[cfg(test)]
+mod seen_tests;
 mod solid_mass;
 #[cfg(test)]
 mod stated_tests;
@@ -70,7 +74,7 @@ pub(crate) mod world;
 mod world_state;
 mod xml;
 
-pub(crate) use folder::{find, read};
+pub(crate) use folder::{Found, find, read, seen as seen_object};
 pub(crate) use lookup::Lookup;
 
 /// Returns the name of the first element of an XML text.

@@ -6,11 +6,12 @@ use std::path::Path;
 use crate::foreign::geometry::Shapes;
 use crate::foreign::lookup::Lookup;
 use crate::foreign::robot_inertia::{self, Mend};
+use crate::foreign::seen::SeenShapes;
 use crate::foreign::urdf_tree::{self, URDF_ROOT, UrdfTree};
 use crate::foreign::xml::{self, Reader};
-use crate::foreign::{mjcf, robot_shapes, root_name, sdf_robot, tree_checks, urdf_writer};
+use crate::foreign::{mjcf, robot_shapes, root_name, sdf_robot, seen, tree_checks, urdf_writer};
 use actcheck_base::{Diagnostic, Diagnostics, Source, digest_of};
-use actcheck_data::{ModelTree, Shape};
+use actcheck_data::{ModelTree, SeenLink, Shape};
 
 /// A robot as its file states it.
 pub(crate) struct RobotFile {
@@ -55,6 +56,37 @@ pub(crate) fn read(
     lookup: &Lookup,
     found: &mut Diagnostics,
 ) -> Option<RobotFile> {
+    let bare = bare(source, path, lookup, found)?;
+    Some(complete(bare, path, lookup, found))
+}
+
+/// Reads what the links look like, in their frames. `without` names those whose collision shapes
+/// are left out. Faults of visual shapes are reported as warnings; the text has no others.
+pub(crate) fn seen(
+    source: &Source,
+    path: &Path,
+    lookup: &Lookup,
+    without: &[String],
+    found: &mut Diagnostics,
+) -> BTreeMap<String, SeenLink> {
+    // Whatever else the text has to report was said when it was read for the simulation.
+    let Some(mut bare) = bare(source, path, lookup, &mut Diagnostics::new()) else {
+        return BTreeMap::new();
+    };
+    let mut shapes = SeenShapes::new(lookup, path);
+    let mut links = BTreeMap::new();
+    for link in &bare.tree.links {
+        if let Some(faults) = bare.faults_of_visuals.remove(&link.name) {
+            found.extend(faults.into_iter().map(seen::as_warning).collect());
+        }
+        let seen = shapes.of_link(link, !without.contains(&link.name), &bare.tree, found);
+        links.insert(link.name.clone(), seen);
+    }
+    links
+}
+
+/// Reads the links and joints.
+fn bare(source: &Source, path: &Path, lookup: &Lookup, found: &mut Diagnostics) -> Option<Bare> {
     let bare = match root_name(&source.text) {
         Some("mujoco") => mjcf::robot(source, path, lookup).map(|(tree, text, said)| {
             found.extend(said);
@@ -78,7 +110,7 @@ pub(crate) fn read(
         faults_of_visuals,
         is_urdf,
     };
-    (!bare.tree.links.is_empty()).then(|| complete(bare, path, lookup, found))
+    (!bare.tree.links.is_empty()).then_some(bare)
 }
 
 /// Reads the tree of a text of URDF.

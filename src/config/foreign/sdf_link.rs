@@ -5,11 +5,14 @@ use nalgebra::{Isometry3, Translation3};
 use crate::foreign::body::{Body, Role};
 use crate::foreign::elements::Children;
 use crate::foreign::geometry::{Shapes, check_volume};
+use crate::foreign::inclusions::Inclusions;
 use crate::foreign::sdf_inertial::{self, CollisionSolid};
 use crate::foreign::sdf_pose::pose;
+use crate::foreign::sdf_robot_include::SdfFile;
 use crate::foreign::sdf_surface::Surface;
 use crate::foreign::xml::{self, Bound, Node, Reader};
-use actcheck_data::{Part, Pose, Shape};
+use crate::foreign::{sdf_robot_link, seen};
+use actcheck_data::{ModelTree, Part, Pose, SeenLink, SeenPart, Shape, TreeLink};
 
 /// Thickness of the plate that a plane becomes. Unit: metres.
 const PLANE_M: f64 = 0.02;
@@ -99,6 +102,9 @@ pub(crate) fn read(
             mass.is_none() && (xml::child(link, "inertial").is_some() || !solids.is_empty());
         body.masses.extend(mass);
     }
+    if shapes.seen.is_some() {
+        body.seen = look(link, at, &solids, shapes, reader);
+    }
     body.parts = solids
         .into_iter()
         .map(|solid| Part {
@@ -107,6 +113,54 @@ pub(crate) fn read(
         })
         .collect();
     body
+}
+
+/// Reads what a link looks like: its visual shapes, or its collision shapes if it has none or one
+/// has a fault.
+fn look(
+    link: Node,
+    at: &Isometry3<f64>,
+    solids: &[CollisionSolid],
+    shapes: &mut Shapes,
+    reader: &mut Reader,
+) -> SeenLink {
+    let mut tree = ModelTree::default();
+    let file = SdfFile {
+        lookup: shapes.lookup,
+        path: shapes.path,
+        inclusions: Inclusions::default(),
+    };
+    let (visuals, faults) = reader.aside(|reader| {
+        let meshes = &mut tree.inline_meshes;
+        let visuals = xml::children(link, "visual");
+        visuals
+            .map(|visual| sdf_robot_link::solid(visual, "", &file, meshes, reader))
+            .collect::<Option<Vec<_>>>()
+    });
+    let link = TreeLink {
+        visuals: visuals.unwrap_or_default(),
+        ..TreeLink::frame(String::new(), reader.place(link))
+    };
+    let Some(shapes) = &mut shapes.seen else {
+        return SeenLink::default();
+    };
+    shapes.report(faults.into_iter().map(seen::as_warning).collect());
+    let mut seen = shapes.of_object(&link, &tree);
+    if !seen.parts.is_empty() {
+        seen.transform(at);
+        return seen;
+    }
+    let collides = |solid: &CollisionSolid| SeenPart {
+        part: Part {
+            pose: Pose::from_isometry(&solid.at),
+            shape: solid.shape.clone(),
+        },
+        colour: None,
+    };
+    SeenLink {
+        parts: solids.iter().map(collides).collect(),
+        has_look: false,
+    }
 }
 
 fn check_motion(link: Node, name: &str, usual: bool, why: &str, reader: &mut Reader) {

@@ -132,10 +132,7 @@ fn submodel(
         .into_iter()
         .collect();
     folders.extend(outer.folders.iter().cloned());
-    let lookup = Lookup {
-        files: outer.files,
-        folders,
-    };
+    let lookup = Lookup::new(outer.files, folders);
     let inner = SdfFile {
         lookup: &lookup,
         path: &text.path,

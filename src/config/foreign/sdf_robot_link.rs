@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::{Isometry3, Matrix3};
 
 use crate::foreign::body::Role;
+use crate::foreign::colours;
 use crate::foreign::elements::{Children, refuse_switch};
 use crate::foreign::geometry::{PrimitiveShape, Shapes, check_scale, cone, kind_of, sdf_primitive};
 use crate::foreign::sdf_inertial::{self, CollisionSolid, INERTIAL};
@@ -14,7 +15,7 @@ use crate::foreign::sdf_robot_include::SdfFile;
 use crate::foreign::sdf_robot_model::LinkAt;
 use crate::foreign::sdf_surface::Surface;
 use crate::foreign::xml::{self, Bound, Node, Reader};
-use actcheck_data::{Mesh, Shape, TreeGeometry, TreeInertial, TreeLink, TreeSolid};
+use actcheck_data::{Mesh, Shape, TreeColour, TreeGeometry, TreeInertial, TreeLink, TreeSolid};
 
 /// Mass of a link without one, in SDF; its moments are 1 kg·m². Unit: kilograms.
 const USUAL_KG: f64 = 1.0;
@@ -99,8 +100,27 @@ fn check_motion(link: Node, reader: &mut Reader) {
     }
 }
 
+/// The colour of a `<visual>`: its material's in diffuse or, without one, ambient light. Reports one
+/// that is not made of numbers (W036).
+fn colour(visual: Node, reader: &mut Reader) -> Option<TreeColour> {
+    let material = xml::child(visual, "material")?;
+    let light = ["diffuse", "ambient"]
+        .into_iter()
+        .find_map(|name| xml::child(material, name))?;
+    let colour = colours::numbers(xml::text(light)).and_then(|numbers| colours::whole(&numbers));
+    if colour.is_none() {
+        let message = format!(
+            "`<{}>` is ignored: it must be three or four numbers, but is `{}`",
+            light.tag_name().name(),
+            xml::short(xml::text(light))
+        );
+        reader.warning("W036", light, message, colours::NO_EFFECT);
+    }
+    colour
+}
+
 /// Reads a shape; `None` if it has none, or after a fault.
-fn solid(
+pub(super) fn solid(
     node: Node,
     link: &str,
     file: &SdfFile,
@@ -134,6 +154,7 @@ fn solid(
         geometry,
         matter: None,
         friction: None,
+        colour: colour(node, reader),
         place: reader.place(kind),
     })
 }

@@ -22,10 +22,7 @@ fn shipped(name: &str) -> PathBuf {
 fn read(path: &Path) -> (Option<RobotFile>, Diagnostics) {
     let source = Files::Disk.read(path).expect("it is readable");
     let folder = path.parent().expect("it is in a folder").to_path_buf();
-    let lookup = Lookup {
-        files: &Files::Disk,
-        folders: vec![folder],
-    };
+    let lookup = Lookup::new(&Files::Disk, vec![folder]);
     let mut found = Diagnostics::new();
     let robot = robot::read(&source, path, &lookup, &mut found);
     (robot.filter(|_| !found.has_errors()), found)

@@ -388,6 +388,7 @@ mod tests {
             geometry,
             matter: Some(matter),
             friction: None,
+            colour: None,
             place: SourceSpan::default(),
         }
     }

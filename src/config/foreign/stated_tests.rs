@@ -26,10 +26,10 @@ fn models(lookup: &Lookup) -> BTreeMap<String, Result<Read, String>> {
 }
 
 fn lookup(folder: &tempfile::TempDir) -> Lookup<'static> {
-    Lookup {
-        files: &Files::Disk,
-        folders: ["m", "m/objects"].map(|at| folder.path().join(at)).into(),
-    }
+    Lookup::new(
+        &Files::Disk,
+        ["m", "m/objects"].map(|at| folder.path().join(at)).into(),
+    )
 }
 
 /// Reads the object `thing` of a file. Returns it with the warnings.

@@ -202,6 +202,11 @@ fn read_link(
     shapes: &mut Shapes,
     found: &mut Diagnostics,
 ) {
+    if let Some(shapes) = &mut shapes.seen {
+        let mut seen = shapes.of_object(link, tree);
+        seen.transform(at);
+        body.seen.add(seen);
+    }
     for solid in &link.solids {
         shapes.load(solid, tree, meshes, found);
     }

@@ -4,12 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Matrix3, Vector3};
 
+use crate::foreign::colours;
 use crate::foreign::geometry::{PrimitiveShape, check_scale, cone, kind_of, primitive};
 use crate::foreign::xml::{self, Bound, Node, Reader};
 use actcheck_base::{Diagnostics, did_you_mean};
 use actcheck_data::{
-    Mesh, ModelTree, TreeGeometry, TreeInertial, TreeJoint, TreeLink, TreeMimic, TreeMotion,
-    TreeSolid,
+    Mesh, ModelTree, TreeColour, TreeGeometry, TreeInertial, TreeJoint, TreeLink, TreeMimic,
+    TreeMotion, TreeSolid,
 };
 
 /// Supported joint types.
@@ -48,6 +49,7 @@ pub(crate) fn read(root: Node, reader: &mut Reader) -> UrdfTree {
     };
     let mut faults_of_visuals = BTreeMap::new();
     warn_about_colours(root, reader);
+    let materials = materials(root);
     let mut names = BTreeSet::new();
     for link in xml::children(root, "link") {
         let Some(name) = reader.attribute(link, "name") else {
@@ -60,14 +62,14 @@ pub(crate) fn read(root: Node, reader: &mut Reader) -> UrdfTree {
         }
         let mut unheard = Reader::new(reader.source);
         let meshes = &mut tree.inline_meshes;
-        let visuals = solids((link, "visual"), meshes, &mut unheard);
+        let visuals = solids((link, "visual"), (&materials, &mut *meshes), &mut unheard);
         if !unheard.found.is_empty() {
             faults_of_visuals.insert(name.to_owned(), unheard.found);
         }
         tree.links.push(TreeLink {
             name: name.to_owned(),
             inertial: inertial(link, reader),
-            solids: solids((link, "collision"), meshes, reader),
+            solids: solids((link, "collision"), (&materials, meshes), reader),
             visuals,
             place: reader.place(link),
         });
@@ -178,13 +180,37 @@ fn warn_about_colours(root: Node, reader: &mut Reader) {
             "`<color>` is ignored: `rgba` must be four numbers, but is `{}`",
             xml::short(numbers)
         );
-        reader.warning(
-            "W036",
-            colour,
-            message,
-            "colours have no effect on the simulation",
-        );
+        reader.warning("W036", colour, message, colours::NO_EFFECT);
     }
+}
+
+/// The colours of materials by their names; the first one of each counts. Links may refer to those
+/// of other links, as in ROS's `urdfdom`.
+fn materials<'a>(root: Node<'a>) -> BTreeMap<&'a str, TreeColour> {
+    let mut known = BTreeMap::new();
+    for material in root.descendants() {
+        if let (true, Some(name), Some(colour)) = (
+            material.has_tag_name("material"),
+            material.attribute("name"),
+            own_colour(material),
+        ) {
+            known.entry(name).or_insert(colour);
+        }
+    }
+    known
+}
+
+/// The colour that a material states itself.
+fn own_colour(material: Node) -> Option<TreeColour> {
+    let text = xml::child(material, "color")?.attribute("rgba")?;
+    colours::rest(&colours::numbers(text)?)
+}
+
+/// The colour of a `<visual>`, by its own material or that with its name.
+fn colour(visual: Node, materials: &BTreeMap<&str, TreeColour>) -> Option<TreeColour> {
+    let material = xml::child(visual, "material")?;
+    let named = || materials.get(material.attribute("name")?).copied();
+    own_colour(material).or_else(named)
 }
 
 /// Reports elements that a joint has already (W036).
@@ -244,10 +270,11 @@ fn inertial(link: Node, reader: &mut Reader) -> Option<TreeInertial> {
 }
 
 /// Reads the shapes of a link in elements of this name. Those that are only placeholders are
-/// reported (W036). Shapes without a mesh file get entries in `meshes`.
+/// reported (W036). Shapes without a mesh file get entries in `meshes`. `materials` are the colours
+/// that they may refer to.
 fn solids(
     (link, element): (Node, &str),
-    meshes: &mut BTreeMap<String, Mesh>,
+    (materials, meshes): (&BTreeMap<&str, TreeColour>, &mut BTreeMap<String, Mesh>),
     reader: &mut Reader,
 ) -> Vec<TreeSolid> {
     let mut found = Vec::new();
@@ -273,6 +300,7 @@ fn solids(
             geometry,
             matter: None,
             friction: None,
+            colour: colour(node, materials),
             place: reader.place(shape),
         });
     }

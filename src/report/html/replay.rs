@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::num::NonZero;
+use std::sync::Arc;
 use std::thread::available_parallelism;
 
 use serde_json::{Value, json};
@@ -12,8 +13,8 @@ use crate::html::pack::{Pack, packed};
 use crate::html::shapes::Shapes;
 use crate::pressed::hardest_of_run;
 use actcheck_base::{Outcome, names};
-use actcheck_data::{BodyState, Form, Role, Trace};
-use actcheck_history::RunDetail;
+use actcheck_data::{Appearances, BodyState, Form, Pose, Role, SeenPart, Snapshot, Trace};
+use actcheck_history::{ObjectDetail, RunDetail};
 
 /// Smallest quantisation step of positions, which is the resolution of traces. The step is larger
 /// if a run spans more than 6.5 m. Unit: metres.
@@ -30,14 +31,26 @@ pub type ReplayedRun = (RunDetail, Option<Trace>, Vec<Explained>);
 #[derive(Debug, Default)]
 pub struct Replays {
     shapes: Shapes,
+    /// What the bodies of campaigns look like, by the campaign's id.
+    appearances: BTreeMap<String, Arc<Appearances>>,
     runs: BTreeMap<String, String>,
     bytes: usize,
 }
 
 impl Replays {
+    /// Whether it is known what the bodies of a campaign look like.
+    pub fn knows(&self, campaign: &str) -> bool {
+        self.appearances.contains_key(campaign)
+    }
+
+    /// Sets what the bodies of a campaign look like, for runs that are added from now on.
+    pub fn set_appearances(&mut self, campaign: &str, appearances: Arc<Appearances>) {
+        self.appearances.insert(campaign.to_owned(), appearances);
+    }
+
     /// Adds a run. A run without a trace can't be played back, but its details are included.
     pub fn add(&mut self, run: &RunDetail, trace: Option<&Trace>, explained: &[Explained]) {
-        let packed = self.bodies(run, trace).packed(run, trace, explained);
+        let packed = self.bodies(place(run), trace).packed(run, trace, explained);
         self.insert(run, packed);
     }
 
@@ -51,7 +64,7 @@ impl Replays {
             Vec::with_capacity(runs.len()),
         );
         for run in runs {
-            numbered.push((run, self.bodies(&run.0, run.1.as_ref())));
+            numbered.push((run, self.bodies(place(&run.0), run.1.as_ref())));
             shapes.push(self.shapes.all().len());
         }
         let of_a_worker = runs
@@ -101,8 +114,12 @@ impl Replays {
         packed(json!(self.shapes.all()).to_string().as_bytes())
     }
 
-    /// The bodies of a run, with the numbers of their shapes.
-    fn bodies(&mut self, run: &RunDetail, trace: Option<&Trace>) -> Bodies {
+    /// The bodies of a run, with the numbers of their shapes, by its campaign and its objects.
+    fn bodies(
+        &mut self,
+        (campaign, objects): (&str, &[ObjectDetail]),
+        trace: Option<&Trace>,
+    ) -> Bodies {
         let Some(trace) = trace.filter(|trace| !trace.snapshots.is_empty()) else {
             return Bodies::default();
         };
@@ -118,49 +135,96 @@ impl Replays {
             .flat_map(|state| &state.bodies);
         let bodies: BTreeMap<&str, &BodyState> =
             first.map(|body| (body.id.as_str(), body)).collect();
-        let roles: BTreeMap<&str, &str> = run
-            .objects
+        let objects: BTreeMap<&str, &ObjectDetail> = objects
             .iter()
-            .map(|object| (object.id.as_str(), role_name(object.role)))
+            .map(|object| (object.id.as_str(), object))
             .collect();
-        let mut form = |name: &str| match (forms.get(name), bodies.get(name)) {
-            (Some(form), _) => Some(self.shapes.of(form)),
-            (None, Some(body)) => Some(self.shapes.around(body)),
-            // A link without geometry is invisible.
-            (None, None) => None,
+        let appearances = self.appearances.get(campaign).cloned().unwrap_or_default();
+        let shapes = &mut self.shapes;
+        // The numbers of a body's shape, and of what it looks like if its shape is needed, too.
+        let mut body = |name: &str| -> Option<Value> {
+            if let Some(parts) = appearances.links.get(name) {
+                return Some(
+                    json!({ "name": name, "form": shapes.of_seen([campaign, name], parts) }),
+                );
+            }
+            let form = match (forms.get(name), bodies.get(name)) {
+                (Some(form), _) => shapes.of(form),
+                (None, Some(body)) => shapes.around(body),
+                // A link without geometry is invisible.
+                (None, None) => return None,
+            };
+            let object = objects.get(name);
+            let role = object.map(|object| role_name(object.role));
+            let mut value = json!({ "name": name, "form": form, "role": role });
+            if let Some((model, parts)) = object.and_then(|object| look(&appearances, object)) {
+                value["seen"] = shapes.of_seen([campaign, model], parts).into();
+            }
+            Some(value)
         };
         let frames = &trace.frames;
         let (mut slots, mut tracks): (Vec<usize>, Vec<Value>) = (Vec::new(), Vec::new());
         for (slot, name) in frames.names.iter().enumerate() {
-            if let Some(form) = form(name) {
+            if let Some(track) = body(name) {
                 slots.push(slot);
-                tracks
-                    .push(json!({ "name": name, "form": form, "role": roles.get(name.as_str()) }));
+                tracks.push(track);
             }
         }
-        let still = bodies.values().filter(|body| !frames.names.contains(&body.id)).filter_map(|body| {
-            let at: Vec<f64> = body.pose.position.iter().chain(&body.pose.rotation).copied().collect();
-            let (kind, role) = (names::local(&body.category), roles.get(body.id.as_str()));
-            Some(json!({ "name": body.id, "form": form(&body.id)?, "at": at, "kind": kind, "role": role }))
-        });
-        let still: Vec<Value> = still.collect();
-        let links = trace
-            .snapshots
-            .iter()
-            .take(1)
-            .flat_map(|state| trace.still_links(state));
-        let links = links.map(|(form, pose)| {
-            let at: Vec<f64> = pose.position.into_iter().chain(pose.rotation).collect();
-            let number = self.shapes.of(form);
-            json!({ "name": form.name, "form": number, "at": at, "kind": ROBOT, "role": ROBOT })
-        });
-        let links: Vec<Value> = links.collect();
+        let at = |pose: &Pose| -> Vec<f64> {
+            pose.position
+                .iter()
+                .chain(&pose.rotation)
+                .copied()
+                .collect()
+        };
+        let mut still = Vec::new();
+        for state in bodies
+            .values()
+            .filter(|body| !frames.names.contains(&body.id))
+        {
+            if let Some(mut value) = body(&state.id) {
+                value["at"] = at(&state.pose).into();
+                value["kind"] = names::local(&state.category).into();
+                still.push(value);
+            }
+        }
+        for (name, pose) in trace.snapshots.iter().take(1).flat_map(links) {
+            if frames.names.contains(&name) {
+                continue;
+            }
+            if let Some(mut value) = body(&name) {
+                value["at"] = at(&pose).into();
+                value["kind"] = ROBOT.into();
+                value["role"] = ROBOT.into();
+                still.push(value);
+            }
+        }
         Bodies {
-            still: still.into_iter().chain(links).collect(),
+            still,
             tracks,
             slots,
         }
     }
+}
+
+/// The campaign and the objects of a run.
+fn place(run: &RunDetail) -> (&str, &[ObjectDetail]) {
+    (&run.row.campaign, &run.objects)
+}
+
+/// What an object looks like, with the name of its model.
+fn look<'a>(
+    appearances: &'a Appearances,
+    object: &ObjectDetail,
+) -> Option<(&'a str, &'a [SeenPart])> {
+    let (model, parts) = appearances.models.get_key_value(&object.model)?;
+    Some((model, parts))
+}
+
+/// The robot's links in a state, by their names in traces.
+fn links(state: &Snapshot) -> impl Iterator<Item = (String, Pose)> {
+    let links = state.robot.links.iter();
+    links.map(|link| (format!("robot/{}", link.name), link.pose))
 }
 
 /// The bodies of a run: fixed ones and tracks, as the page gets them.
@@ -326,6 +390,90 @@ fn corner(rows: &[Vec<f32>], slots: &[usize]) -> ([f64; 3], f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::made_up::snapshot;
+    use actcheck_data::{Colour, Frames, LinkState, Part, Shape};
+
+    /// The mesh of a robot is in the page once, however many runs it has.
+    #[test]
+    fn what_bodies_look_like_is_shared_by_all_runs_of_a_campaign() {
+        let look = |red: u8| {
+            vec![SeenPart {
+                part: Part {
+                    pose: Pose::IDENTITY,
+                    shape: Shape::Box { size: [0.1; 3] },
+                },
+                colour: Some(Colour([red, 0, 0])),
+            }]
+        };
+        let mut state = snapshot(0.0);
+        state.robot.links = ["hand", "pedestal"]
+            .map(|name| LinkState {
+                name: name.to_owned(),
+                pose: Pose::IDENTITY,
+            })
+            .into();
+        let trace = Trace {
+            snapshots: vec![state],
+            frames: Frames {
+                names: vec!["glass_1".to_owned(), "robot/hand".to_owned()],
+                ..Frames::default()
+            },
+            ..Trace::default()
+        };
+        let glass = ObjectDetail {
+            id: "glass_1".to_owned(),
+            model: "glass".to_owned(),
+            category: String::new(),
+            role: Role::Target,
+            x: 0.0,
+            y: 0.0,
+            z: 0.0,
+            yaw: 0.0,
+            mass_kg: 1.0,
+            friction: 1.0,
+            restitution: 0.0,
+            robot_distance_m: 1.0,
+            neighbour_distance_m: None,
+            target_distance_m: None,
+            displacement_m: None,
+            max_tilt_rad: None,
+        };
+        let mut replays = Replays::default();
+        let appearances = Appearances {
+            links: [("robot/hand", 1), ("robot/pedestal", 2)]
+                .map(|(name, red)| (name.to_owned(), look(red)))
+                .into(),
+            models: [("glass".to_owned(), look(3))].into(),
+        };
+        assert!(!replays.knows("a"));
+        replays.set_appearances("a", Arc::new(appearances));
+        assert!(replays.knows("a"));
+        let mut of = |campaign: &str| {
+            let bodies = replays.bodies((campaign, std::slice::from_ref(&glass)), Some(&trace));
+            let named = |value: &Value| {
+                let number = |key: &str| value[key].as_u64();
+                (value["name"].to_string(), number("form"), number("seen"))
+            };
+            let tracks: Vec<_> = bodies.tracks.iter().map(named).collect();
+            let still: Vec<_> = bodies.still.iter().map(named).collect();
+            (tracks, still)
+        };
+        let (tracks, still) = of("a");
+        // The shape of the glass is needed to measure distances.
+        let of_hand = ("\"robot/hand\"".to_owned(), Some(2), None);
+        assert_eq!(
+            tracks,
+            [("\"glass_1\"".to_owned(), Some(0), Some(1)), of_hand]
+        );
+        // The pedestal has no track and no collision shape.
+        assert_eq!(still[1], ("\"robot/pedestal\"".to_owned(), Some(3), None));
+        assert_eq!(of("a"), (tracks, still));
+        // Of another campaign, nothing is known.
+        let (tracks, still) = of("b");
+        assert_eq!((tracks.len(), still.len()), (1, 1));
+        assert_eq!(tracks[0].2, None);
+        assert_eq!(replays.shapes.all().len(), 4);
+    }
 
     /// The page may depend neither on the number of cores nor on how many runs are read at once.
     #[test]

@@ -224,7 +224,7 @@ mod tests {
         assert!(draw(&mut drawing, &[chart], area, 18.0) > 100.0);
         let texts = drawing.marks.iter().filter_map(|(_, mark)| match mark {
             crate::picture::drawing::Mark::Words(words) => Some(words),
-            crate::picture::drawing::Mark::Shape { .. } => None,
+            _ => None,
         });
         let place = |words: &Words| {
             (

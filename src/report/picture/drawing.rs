@@ -1,5 +1,7 @@
 //! Vector drawings: a list of shapes and text, independent of the output format.
 
+use tiny_skia::Pixmap;
+
 use crate::picture::font;
 
 /// A rectangle. Unit: pixels, y down.
@@ -179,7 +181,17 @@ pub(super) enum Mark {
         style: Style,
     },
     Words(Words),
+    /// Pixels with [`DENSITY`] for each of the drawing, and their opacity.
+    Image {
+        pixels: Pixmap,
+        /// Upper left corner.
+        at: [f64; 2],
+        opacity: f64,
+    },
 }
+
+/// Pixels of a file per pixel of the drawing, so that small text stays sharp when zoomed in.
+pub(super) const DENSITY: f64 = 2.0;
 
 /// A picture: shapes and text, drawn in order. Unit: pixels; origin at the upper left, y down.
 #[derive(Debug, Clone, PartialEq)]
@@ -249,6 +261,18 @@ impl Drawing {
                 },
             ));
         }
+    }
+
+    /// Draws pixels over what is there.
+    pub(super) fn image(&mut self, pixels: Pixmap, at: [f64; 2], opacity: f64) {
+        self.marks.push((
+            self.clip,
+            Mark::Image {
+                pixels,
+                at,
+                opacity,
+            },
+        ));
     }
 
     /// Writes a line of text; the end of one that would run out of the picture becomes an ellipsis.

@@ -7,7 +7,7 @@ use crate::picture::drawing::{Drawing, Paint, Rect, Style, Words};
 use crate::picture::{font, paint};
 use crate::pressed::Pressed;
 use actcheck_base::{Outcome, names};
-use actcheck_data::Role;
+use actcheck_data::{Appearances, Role, SeenPart};
 use actcheck_history::{ActionDetail, RunDetail};
 
 /// Maximum number of failures listed; a picture is not a report.
@@ -37,9 +37,30 @@ pub struct Caption {
     pub charts: Vec<Chart>,
     /// Role of each object, by id.
     pub roles: BTreeMap<String, Role>,
+    /// What bodies look like, by the id of the object or the name of the link in traces. All others
+    /// are drawn by the shapes in the trace.
+    pub seen: BTreeMap<String, Vec<SeenPart>>,
 }
 
 impl Caption {
+    /// Adds what the bodies of the run's campaign look like.
+    #[must_use]
+    pub fn with_appearances(self, run: &RunDetail, appearances: &Appearances) -> Self {
+        let objects = run.objects.iter().filter_map(|object| {
+            let parts = appearances.models.get(&object.model)?;
+            Some((object.id.clone(), parts.clone()))
+        });
+        Self {
+            seen: appearances
+                .links
+                .clone()
+                .into_iter()
+                .chain(objects)
+                .collect(),
+            ..self
+        }
+    }
+
     /// The caption of a stored run.
     pub fn of(run: &RunDetail) -> Self {
         let row = &run.row;
@@ -79,6 +100,7 @@ impl Caption {
             failures: reason.chain(failed).collect(),
             witnesses: witnesses.collect(),
             charts: Vec::new(),
+            seen: BTreeMap::new(),
             roles: run
                 .objects
                 .iter()

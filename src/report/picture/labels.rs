@@ -214,7 +214,7 @@ mod tests {
         Labels::new(PANEL, things).write(&mut drawing, &label);
         let texts = drawing.marks.iter().filter_map(|(_, mark)| match mark {
             Mark::Words(words) => Some(words),
-            Mark::Shape { .. } => None,
+            Mark::Shape { .. } | Mark::Image { .. } => None,
         });
         let rect = |words: &Words| Rect {
             left: words.at[0],

@@ -2,17 +2,18 @@
 //! from the side.
 //!
 //! From a run to pixels: [`run`] lays out the panels, [`window`] selects the region that each
-//! shows, [`outline`] and [`paths`] compute the outlines of bodies and the paths of motions, and
-//! [`labels`] places names. The result is a [`drawing`] of plain shapes, which [`svg`] writes and
+//! shows, [`outline`] and [`paths`] compute the outlines of bodies and the paths of motions,
+//! [`facets`] shades the bodies whose files say what they look like, and [`labels`] places names. The result is a [`drawing`] of plain shapes, which [`svg`] writes and
 //! [`png`] rasterises, with glyphs from [`font`]. [`patterns`] draws the runs of patterns in the
 //! same way, [`collisions`] the things that were hit, and [`charts`] the signals that decided
 //! properties about time. [`robot`] draws a robot in its postures.
 //!
-//! Never: reads or writes a file, or uses a shape that is not in the trace.
+//! Never: reads or writes a file, or simulates anything.
 
 mod charts;
 mod collisions;
 mod drawing;
+mod facets;
 mod font;
 mod header;
 mod labels;

@@ -38,8 +38,13 @@ pub(super) fn bounds_of(parts: &[Part], pose: &Isometry3<f64>) -> Option<Bounds>
     Bounds::union(points)
 }
 
+/// Number of corners of a round shape in each of the circles that they are on.
+pub(super) const fn corners_around() -> usize {
+    AROUND as usize
+}
+
 /// Points whose convex hull is the shape, within a few percent. Frame: shape.
-fn corners(shape: &Shape) -> Vec<Point3<f64>> {
+pub(super) fn corners(shape: &Shape) -> Vec<Point3<f64>> {
     match shape {
         Shape::Box { size } => {
             let [x, y, z] = size.map(|extent| extent / 2.0);

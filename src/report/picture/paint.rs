@@ -36,6 +36,10 @@ pub(super) const ROBOT: Style = Style::both(
     Paint::new(0x5a_7a99, 0.22),
     Line::new(Paint::new(0x3f_5a75, 0.55), 0.6),
 );
+/// Links without a colour in their files.
+pub(super) const PLAIN_ROBOT: u32 = 0x9d_b0c4;
+/// Opacity of a robot that is drawn as it looks: what it holds shines through.
+pub(super) const ROBOT_OPACITY: f64 = 0.82;
 pub(super) const PRESSED: Style = Style::both(
     Paint::solid(FAILED),
     Line::new(Paint::solid(0xff_ffff), 1.6),
@@ -66,6 +70,11 @@ pub(super) fn rgb_of(role: Role) -> u32 {
 pub(super) fn movable(role: Role) -> Style {
     let rgb = rgb_of(role);
     Style::both(Paint::new(rgb, 0.5), Line::new(Paint::solid(rgb), 1.0))
+}
+
+/// The colour of a body of a style that looks like this, but for its own colours.
+pub(super) fn plain(style: &Style) -> u32 {
+    style.fill.map_or(OTHER, |fill| fill.rgb)
 }
 
 /// Line style of a path: base wide, hand thin, target dotted.

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::picture::drawing::{Drawing, Line, Paint, Rect, Style, Words};
+use crate::picture::facets::Facets;
 use crate::picture::labels::{Label, Labels};
 use crate::picture::outline::{bounds_of, silhouette};
 use crate::picture::paths::{Mover, Path};
@@ -10,7 +11,7 @@ use crate::picture::window::{Bounds, Window};
 use crate::picture::{font, paint};
 use crate::pressed::Pressed;
 use actcheck_base::names;
-use actcheck_data::{BodyState, Form, Part, Role, Shape, Snapshot, Trace};
+use actcheck_data::{BodyState, Form, Part, Role, SeenPart, Shape, Snapshot, Trace};
 
 /// Links farther than this outside of the window, such as those behind the things of a side view,
 /// are omitted. Unit: metres.
@@ -28,6 +29,8 @@ pub(super) struct PanelData<'a> {
     pub(super) paths: &'a [Path],
     pub(super) pressed: Option<Pressed>,
     pub(super) roles: &'a BTreeMap<String, Role>,
+    /// What bodies look like, by the id of the object or the name of the link in traces.
+    pub(super) seen: &'a BTreeMap<String, Vec<SeenPart>>,
     pub(super) forms: BTreeMap<&'a str, &'a Form>,
 }
 
@@ -79,18 +82,9 @@ pub(super) fn draw(
         .iter()
         .filter(|body| window.overlaps(&Bounds::of(body)))
         .collect();
-    for body in shown.iter().filter(|body| body.fixed) {
-        drawing.shape(form(data, body, window), true, fixed_style(body));
-    }
-    for body in shown.iter().filter(|body| !body.fixed) {
-        drawing.shape(
-            form(data, body, window),
-            true,
-            paint::movable(data.role(body)),
-        );
-    }
+    bodies(drawing, data, &shown, window);
     let mut labels = Labels::new(window.panel, things(&shown, window));
-    labels.spare(robot(drawing, data.trace, snapshot, window));
+    labels.spare(robot(drawing, data, snapshot, window));
     heading(drawing, snapshot.robot.base_true, window);
     match moment {
         Moment::Before => percepts(drawing, data.trace, window),
@@ -130,23 +124,100 @@ fn form(data: &PanelData<'_>, body: &BodyState, window: &Window) -> Vec<Vec<[f64
     }
 }
 
-/// Draws all links of the robot, also those that are fixed to a fixed base.
-/// Returns the rectangles around them.
-fn robot(drawing: &mut Drawing, trace: &Trace, snapshot: &Snapshot, window: &Window) -> Vec<Rect> {
-    let links = trace.linked_forms(snapshot).filter_map(|(form, pose)| {
-        let pose = pose.to_isometry();
-        let origin = Bounds::point(pose.translation.vector.into());
-        let around = bounds_of(&form.parts, &pose).map_or(origin, |shapes| shapes.with(origin));
-        window
-            .overlaps(&around.grown(BESIDE_M))
-            .then(|| silhouette(&form.parts, &pose, window))
-    });
-    let outlines: Vec<Vec<[f64; 2]>> = links.flatten().collect();
-    let around = outlines
-        .iter()
-        .filter_map(|line| rect_around(line))
-        .collect();
-    drawing.shape(outlines, true, paint::ROBOT);
+/// Draws furniture, then objects: what they look like, or their shapes. Objects have an outline in
+/// the colour of their role.
+fn bodies(drawing: &mut Drawing, data: &PanelData<'_>, shown: &[&BodyState], window: &Window) {
+    for is_fixed in [true, false] {
+        let mut facets = Facets::new(window, false);
+        for body in shown.iter().filter(|body| body.fixed == is_fixed) {
+            let style = match is_fixed {
+                true => fixed_style(body),
+                false => paint::movable(data.role(body)),
+            };
+            match data.seen.get(&body.id) {
+                Some(parts) => facets.add(parts, &body.pose.to_isometry(), paint::plain(&style)),
+                None => drawing.shape(form(data, body, window), true, style),
+            }
+        }
+        show(drawing, &facets, window, 1.0);
+    }
+    let looks = |body: &&&BodyState| data.seen.contains_key(&body.id);
+    for body in shown.iter().filter(|body| !body.fixed).filter(looks) {
+        outline(drawing, data, body, window);
+    }
+}
+
+/// Draws the outline of an object in the colour of its role.
+fn outline(drawing: &mut Drawing, data: &PanelData<'_>, body: &BodyState, window: &Window) {
+    let style = paint::movable(data.role(body));
+    let line = Style {
+        fill: None,
+        ..style
+    };
+    drawing.shape(form(data, body, window), true, line);
+}
+
+fn show(drawing: &mut Drawing, facets: &Facets, window: &Window, opacity: f64) {
+    if let Some(pixels) = facets.picture() {
+        drawing.image(pixels, [window.panel.left, window.panel.top], opacity);
+    }
+}
+
+/// Draws all links of the robot, also those that are fixed to a fixed base: what they look like, or
+/// their shapes. Returns the rectangles around them.
+fn robot(
+    drawing: &mut Drawing,
+    data: &PanelData<'_>,
+    snapshot: &Snapshot,
+    window: &Window,
+) -> Vec<Rect> {
+    let links = data
+        .trace
+        .linked_forms(snapshot)
+        .filter_map(|(form, pose)| {
+            let pose = pose.to_isometry();
+            let origin = Bounds::point(pose.translation.vector.into());
+            let around = bounds_of(&form.parts, &pose).map_or(origin, |shapes| shapes.with(origin));
+            let is_near = window.overlaps(&around.grown(BESIDE_M));
+            is_near.then(|| (form.name.as_str(), silhouette(&form.parts, &pose, window)))
+        });
+    let links: Vec<(&str, Vec<Vec<[f64; 2]>>)> = links.collect();
+    let outlines = links.iter().flat_map(|(_, outlines)| outlines);
+    let mut around: Vec<Rect> = outlines.filter_map(|line| rect_around(line)).collect();
+    let plain = links
+        .into_iter()
+        .filter(|(name, _)| !data.seen.contains_key(*name));
+    drawing.shape(
+        plain.flat_map(|(_, lines)| lines).collect(),
+        true,
+        paint::ROBOT,
+    );
+    let mut facets = Facets::new(window, false);
+    for link in &snapshot.robot.links {
+        let Some(parts) = data.seen.get(&format!("robot/{}", link.name)) else {
+            continue;
+        };
+        let pose = link.pose.to_isometry();
+        let shapes = parts.iter().map(|seen| seen.part.bounds_at(&pose));
+        let bounds = Bounds::union(shapes.map(|(low, high)| Bounds { low, high }));
+        if let Some(bounds) = bounds.filter(|bounds| window.overlaps(&bounds.grown(BESIDE_M))) {
+            facets.add(parts, &pose, paint::PLAIN_ROBOT);
+            around.push(window.rect(&bounds));
+        }
+    }
+    if let Some(pixels) = facets.picture() {
+        drawing.image(
+            pixels,
+            [window.panel.left, window.panel.top],
+            paint::ROBOT_OPACITY,
+        );
+        // The hand must not hide what it holds.
+        for body in snapshot.bodies.iter().filter(|body| !body.fixed) {
+            if window.overlaps(&Bounds::of(body)) {
+                outline(drawing, data, body, window);
+            }
+        }
+    }
     around
 }
 

@@ -1,14 +1,11 @@
 //! Rasterises a drawing and encodes it as PNG.
 
 use tiny_skia::{
-    FillRule, LineJoin, Mask, Path, PathBuilder, Pixmap, Stroke, StrokeDash, Transform,
+    FillRule, LineJoin, Mask, Path, PathBuilder, Pixmap, PixmapPaint, Stroke, StrokeDash, Transform,
 };
 
-use crate::picture::drawing::{Drawing, Line, Mark, Paint, Rect};
+use crate::picture::drawing::{DENSITY, Drawing, Line, Mark, Paint, Rect};
 use crate::picture::font;
-
-/// Pixels of the file per pixel of the drawing, so that small text stays sharp when zoomed in.
-const DENSITY: f64 = 2.0;
 
 impl Drawing {
     /// Encodes the drawing as a PNG file, with twice its width and height in pixels.
@@ -46,6 +43,11 @@ impl Drawing {
                     }
                     canvas.fill(&path, words.paint);
                 }
+                Mark::Image {
+                    pixels,
+                    at,
+                    opacity,
+                } => canvas.image(pixels, *at, *opacity),
             }
         }
         Ok(canvas.pixels.encode_png()?)
@@ -133,6 +135,25 @@ impl Canvas {
         let mask = self.clip.as_ref().map(|(_, mask)| mask);
         self.pixels
             .fill_path(path, &brush(paint), FillRule::Winding, scale(), mask);
+    }
+
+    /// Draws pixels, at the nearest whole ones.
+    fn image(&mut self, pixels: &Pixmap, at: [f64; 2], opacity: f64) {
+        let mask = self.clip.as_ref().map(|(_, mask)| mask);
+        #[expect(clippy::cast_possible_truncation, reason = "pixels")]
+        let [left, top] = at.map(|along| (along * DENSITY).round() as i32);
+        let paint = PixmapPaint {
+            opacity: single(opacity),
+            ..PixmapPaint::default()
+        };
+        self.pixels.draw_pixmap(
+            left,
+            top,
+            pixels.as_ref(),
+            &paint,
+            Transform::identity(),
+            mask,
+        );
     }
 
     fn stroke(&mut self, path: &Path, line: &Line) {

@@ -46,6 +46,7 @@ pub fn run_picture(caption: &Caption, trace: &Trace) -> Option<Drawing> {
         trace,
         paths: &paths,
         roles: &caption.roles,
+        seen: &caption.seen,
         pressed: hardest_of_run(
             trace,
             caption
@@ -166,4 +167,91 @@ fn row(
         );
     }
     top + TITLE_PX + height + 10.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made_up::snapshot;
+    use crate::picture::drawing::Mark;
+    use actcheck_data::{Colour, Form, Frames, LinkState, Part, Pose, SeenPart, Shape};
+
+    fn cube() -> Part {
+        Part {
+            pose: Pose::IDENTITY,
+            shape: Shape::Box { size: [0.1; 3] },
+        }
+    }
+
+    /// A fixed robot of a pedestal, which has no track, and of a hand.
+    fn trace() -> Trace {
+        let mut state = snapshot(0.0);
+        for body in &mut state.bodies {
+            (body.aabb_min, body.aabb_max) = ([-0.2; 3], [0.2; 3]);
+        }
+        let names = ["pedestal", "hand"];
+        state.robot.links = names
+            .iter()
+            .zip([0.0, 0.3])
+            .map(|(name, x)| LinkState {
+                name: (*name).to_owned(),
+                pose: Pose::upright([x, 0.3, 0.2], 0.0),
+            })
+            .collect();
+        let form = |name: &&str| Form {
+            name: format!("robot/{name}"),
+            parts: vec![cube()],
+        };
+        Trace {
+            snapshots: vec![state.clone(), state],
+            frames: Frames {
+                names: vec!["robot/hand".to_owned()],
+                ..Frames::default()
+            },
+            forms: names.iter().map(form).collect(),
+            ..Trace::default()
+        }
+    }
+
+    /// For each panel: the number of links that are drawn by their shapes; and the number of
+    /// images.
+    fn drawn(caption: &Caption) -> (Vec<usize>, usize) {
+        let drawing = run_picture(caption, &trace()).expect("it has states");
+        let links = drawing.marks.iter().filter_map(|(_, mark)| match mark {
+            Mark::Shape { lines, style, .. } if *style == paint::ROBOT => Some(lines.len()),
+            _ => None,
+        });
+        let images = drawing
+            .marks
+            .iter()
+            .filter(|(_, mark)| matches!(mark, Mark::Image { .. }));
+        (links.collect(), images.count())
+    }
+
+    #[test]
+    fn links_that_no_joint_moves_are_drawn_too() {
+        assert_eq!(drawn(&Caption::default()), (vec![2; 4], 0));
+    }
+
+    #[test]
+    fn a_link_with_a_look_is_drawn_as_it_looks() {
+        let look = vec![SeenPart {
+            part: cube(),
+            colour: Some(Colour([255, 0, 0])),
+        }];
+        let hand = Caption {
+            seen: [("robot/hand".to_owned(), look.clone())].into(),
+            ..Caption::default()
+        };
+        assert_eq!(drawn(&hand), (vec![1; 4], 4));
+        let names = ["robot/hand", "robot/pedestal", "glass_1", "table_1"];
+        let all = Caption {
+            seen: names.map(|name| (name.to_owned(), look.clone())).into(),
+            ..Caption::default()
+        };
+        let (links, images) = drawn(&all);
+        assert_eq!((links, images), (vec![], 12));
+        let svg = run_picture(&all, &trace()).expect("it has states").to_svg();
+        assert_eq!(svg.matches("data:image/png;base64,").count(), 12);
+    }
 }

@@ -2,7 +2,11 @@
 
 use std::fmt::Write as _;
 
-use crate::picture::drawing::{Drawing, Line, Mark, Paint, Rect, Style, Words};
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use tiny_skia::Pixmap;
+
+use crate::picture::drawing::{DENSITY, Drawing, Line, Mark, Paint, Rect, Style, Words};
 use crate::picture::font;
 use crate::xml;
 
@@ -28,6 +32,11 @@ impl Drawing {
                     style,
                 } => shape(&mut out, lines, *closed, style),
                 Mark::Words(words) => text(&mut out, words),
+                Mark::Image {
+                    pixels,
+                    at,
+                    opacity,
+                } => image(&mut out, pixels, *at, *opacity),
             }
         }
         change_clip(&mut out, clip, None, 0);
@@ -71,6 +80,22 @@ fn shape(out: &mut String, lines: &[Vec<[f64; 2]>], closed: bool, style: &Style)
         out,
         "<path d=\"{path}\"{fill}{}/>",
         style.line.map_or_else(String::new, stroke)
+    );
+}
+
+/// Writes pixels as an embedded file of PNG.
+fn image(out: &mut String, pixels: &Pixmap, [x, y]: [f64; 2], opacity: f64) {
+    let Ok(png) = pixels.encode_png() else {
+        // Only an image too large for memory can't be encoded.
+        return;
+    };
+    let [width, height] =
+        [pixels.width(), pixels.height()].map(|pixels| f64::from(pixels) / DENSITY);
+    let _ = writeln!(
+        out,
+        "<image x=\"{x:.1}\" y=\"{y:.1}\" width=\"{width:.1}\" height=\"{height:.1}\" opacity=\"{opacity}\" \
+         href=\"data:image/png;base64,{}\"/>",
+        BASE64_STANDARD.encode(png)
     );
 }
 

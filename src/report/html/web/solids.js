@@ -10,6 +10,7 @@ function geometryOf(three, part) {
     case "capsule": return upright(new three.CapsuleGeometry(part.radius, part.height, 8, 20));
     case "tube": return upright(tube(three, part));
     case "hull": return hull(three, part.points);
+    case "mesh": return mesh(three, part);
     default: return new three.BoxGeometry(0.01, 0.01, 0.01);
   }
 }
@@ -54,6 +55,20 @@ function hull(three, points) {
   return geometry;
 }
 
+/** A mesh: its numbers are differences from the previous ones (see `shapes.rs`). */
+function mesh(three, { points, faces }) {
+  const at = [], corners = [], last = [0, 0, 0];
+  points.forEach((step, i) => at.push(last[i % 3] += step));
+  for (let i = 0, first = 0; i < faces.length; i += 3) {
+    first += faces[i];
+    for (const corner of [first, first + faces[i + 1], first + faces[i + 2]]) corners.push(...at.slice(3 * corner, 3 * corner + 3).map((value) => value / 1e4));
+  }
+  const geometry = new three.BufferGeometry();
+  geometry.setAttribute("position", new three.Float32BufferAttribute(corners, 3));
+  geometry.computeVertexNormals();
+  return geometry;
+}
+
 /** Triangulates a planar convex face, counter-clockwise seen from outside. */
 function fan(three, points, normal) {
   const middle = points.reduce((sum, point) => sum.add(point), new three.Vector3()).divideScalar(points.length);
@@ -72,10 +87,20 @@ const LOOKS = {
 function bodyOf(three, form, look) {
   const [colour, roughness, metalness] = LOOKS[look] ?? LOOKS.other;
   const material = new three.MeshStandardMaterial({ color: colour, roughness, metalness, side: three.DoubleSide });
+  const coloured = new Map();
+  const materialOf = (part) => {
+    if (part.colour === undefined) return material;
+    if (!coloured.has(part.colour)) {
+      const own = material.clone();
+      own.color.set(part.colour);
+      coloured.set(part.colour, own);
+    }
+    return coloured.get(part.colour);
+  };
   if (look === "wall") Object.assign(material, { transparent: true, opacity: 0.16, depthWrite: false });
   const group = new three.Group();
   for (const part of form) {
-    const mesh = new three.Mesh(geometryOf(three, part), material);
+    const mesh = new three.Mesh(geometryOf(three, part), materialOf(part));
     mesh.position.set(...part.at.slice(0, 3));
     mesh.quaternion.set(...part.at.slice(3)).normalize();
     mesh.castShadow = look !== "wall";

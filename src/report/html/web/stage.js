@@ -49,13 +49,13 @@ class Stage {
     this.floor.position.z = -0.001;
     scene.add(this.floor);
     for (const body of replay.still) {
-      const group = bodyOf(three, forms[body.form], body.kind === "Wall" ? "wall" : body.role ?? "platform");
+      const group = bodyOf(three, forms[body.seen ?? body.form], body.kind === "Wall" ? "wall" : body.role ?? "platform");
       group.position.set(...body.at.slice(0, 3));
       group.quaternion.set(...body.at.slice(3)).normalize();
       scene.add(group);
     }
     this.moving = this.course.tracks.map((track) => {
-      const group = bodyOf(three, forms[track.form], track.name.startsWith("robot/") ? "robot" : track.role ?? "other");
+      const group = bodyOf(three, forms[track.seen ?? track.form], track.name.startsWith("robot/") ? "robot" : track.role ?? "other");
       scene.add(group);
       return group;
     });
