@@ -1,4 +1,4 @@
-//! What the bodies of a stored campaign look like, for pictures of its runs.
+//! The appearance of the bodies of a stored campaign, for pictures of its runs.
 
 use crate::environment::stored_campaign;
 use crate::solids;
@@ -11,7 +11,7 @@ const MOST_OF_A_BODY: usize = 2000;
 /// Most triangles of all bodies, whose meshes are a part of a report.
 const MOST_OF_ALL: usize = 20_000;
 
-/// Reads what the bodies of a campaign look like: the visual shapes that the files of its
+/// Reads the appearance of the bodies of a campaign: the visual shapes that the files of its
 /// configuration name, with few triangles. Adds a warning for each that can't be read (W034, W036,
 /// W037). Bodies without visual shapes are left out, as are all if the campaign can't be prepared
 /// any more or has another robot now: pictures show the shapes that their traces contain.

@@ -55,7 +55,7 @@ pub struct PlayableRun {
 /// Another physics engine, which gets its scene in MJCF.
 pub trait EngineLink: Send {
     /// Loads a scene. `joints` and `objects` are the names of the robot's joints and the ids of the
-    /// objects, in the order in which states are told; a tick has this length in seconds.
+    /// objects, in the order of the states; a tick has this length in seconds.
     ///
     /// # Errors
     /// Why it can't, in words.
@@ -133,7 +133,7 @@ pub fn played_in(
     link: Box<dyn EngineLink>,
 ) -> Result<PlayableRun, Diagnostics> {
     let stored = Stored::of(history, env, detail)?;
-    // What only happens in the other engine is drawn anew.
+    // Choices that only the other engine leads to are drawn anew.
     let (seed, index) = (detail.seed, detail.row.index);
     let choices = || Choices::partly_recorded(&stored.choices, seed, index);
     let scene = scenario::draw(&env.space, env.test_of(stored.index), &mut choices())

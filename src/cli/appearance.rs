@@ -1,4 +1,4 @@
-//! What the bodies of campaigns look like, for pictures and reports.
+//! The appearance of the bodies of campaigns, for pictures and reports.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use actcheck_campaign::{Env, appearances};
 use actcheck_data::Appearances;
 use actcheck_history::History;
 
-/// Reads what bodies look like. Campaigns of the same configuration share it.
+/// Reads the appearance of bodies. Campaigns of the same configuration share it.
 pub(super) struct AppearanceReader<'a> {
     history: &'a History,
     is_trusted: bool,
@@ -27,7 +27,7 @@ impl<'a> AppearanceReader<'a> {
         }
     }
 
-    /// Returns what the bodies of a campaign look like; nothing if that can't be read any more. Warns
+    /// Returns the appearance of the bodies of a campaign; nothing if that can't be read any more. Warns
     /// of visual shapes that can't be read, and of a program that is not started.
     ///
     /// # Errors

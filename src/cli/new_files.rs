@@ -34,23 +34,28 @@ impl NewFiles {
         Ok(())
     }
 
+    /// Checks that a file does not exist. A dangling symbolic link counts as existing.
+    ///
+    /// # Errors
+    /// X015: it exists.
+    pub(super) fn check_absent(file: &Path, help: &str) -> Result<(), Diagnostics> {
+        match fs::symlink_metadata(file) {
+            Err(_) => Ok(()),
+            Ok(_) => {
+                let message = format!("{} already exists", file.display());
+                Err(Diagnostic::error("X015", message).help(help).into())
+            }
+        }
+    }
+
     /// Writes all files and the folders that they need. If one fails, removes those that it has
     /// written.
     ///
     /// # Errors
     /// X015: one of the files exists. X007: one can't be written.
     pub(super) fn write(&self, help: &str) -> Result<(), Diagnostics> {
-        // A dangling symbolic link counts as existing.
-        if let Some(file) = self
-            .files
-            .keys()
-            .find(|file| fs::symlink_metadata(file).is_ok())
-        {
-            return Err(
-                Diagnostic::error("X015", format!("{} already exists", file.display()))
-                    .help(help)
-                    .into(),
-            );
+        for file in self.files.keys() {
+            Self::check_absent(file, help)?;
         }
         let mut made = Vec::new();
         for (file, bytes) in &self.files {

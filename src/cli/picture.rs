@@ -51,7 +51,7 @@ impl<'a> Picture<'a> {
     }
 
     /// Draws a run, with the signals that decided its failed properties about time by the rules of
-    /// an ontology, or of the usual one. `looks` tells what bodies look like.
+    /// an ontology, or of the usual one. `looks` has the appearance of bodies.
     ///
     /// # Errors
     /// X006: the run has no state to draw; X007: the file can't be written.

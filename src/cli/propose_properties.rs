@@ -31,6 +31,8 @@ const RUNS_FOR_PHASES: usize = 30;
 const MOST_TRIED: usize = 400;
 /// The ontology with the proposed properties, beside their rule files.
 const ROOT: &str = "properties.ttl";
+/// Help if the files exist.
+const TAKEN: &str = "name another folder with `--output`, or remove the proposals of last time";
 /// IRI of the ontology that is part of the program.
 const SHIPPED: &str = "https://w3id.org/actcheck/ontology";
 
@@ -93,6 +95,8 @@ struct Proposed {
 /// Proposes properties, and writes their rule files. Returns the exit code.
 pub fn propose_properties(args: &ProposePropertiesArgs) -> Result<u8, Diagnostics> {
     let labels = args.labels.as_deref().map(read_labels).transpose()?;
+    // Before minutes of simulation.
+    NewFiles::check_absent(&args.output.join(ROOT), TAKEN)?;
     let history = History::open_to_read(&args.history)?;
     let id = match &args.campaign {
         Some(id) => id.clone(),
@@ -397,7 +401,7 @@ fn write(
         );
     }
     new.add(args.output.join(ROOT), text);
-    new.write("name another folder with `--output`, or remove the proposals of last time")
+    new.write(TAKEN)
 }
 
 /// The evidence for a property, as sentences for its rule file.

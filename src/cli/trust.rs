@@ -36,14 +36,14 @@ pub fn starts_none(campaign: &str, starts: &Starts) -> bool {
     false
 }
 
-/// Whether reading what the robot of a campaign looks like starts no program. If it does, a warning
+/// Whether reading the appearance of the robot of a campaign starts no program. If it does, a warning
 /// names the command.
 pub fn expands_none(campaign: &str, starts: &Starts) -> bool {
     let Some(commands) = in_words(&starts.expansion) else {
         return true;
     };
     let message = format!(
-        "pictures show the collision shapes of the robot of campaign {campaign}: reading what it looks like would start \
+        "pictures show the collision shapes of the robot of campaign {campaign}: reading its appearance would start \
          {commands}"
     );
     let help = "a xacro file may contain code: read it, then give the same command with `--trust`";

@@ -168,7 +168,7 @@ pub fn with_urdf(core: RobotCore, urdf: Source) -> Result<RobotCore, Diagnostics
     })
 }
 
-/// Reads what the links of a profile's robot look like, by the names in its file. Faults are
+/// Reads the appearance of the links of a profile's robot, by the names in its file. Faults are
 /// warnings, and the links with faults have their collision shapes. Returns nothing if the profile
 /// can't be read: [`read_with`] reports the reason.
 pub(crate) fn seen(

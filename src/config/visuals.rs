@@ -1,4 +1,4 @@
-//! What the bodies of a configuration look like: read only for pictures.
+//! The appearance of the bodies of a configuration: read only for pictures.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -31,7 +31,7 @@ pub(crate) struct RobotPlace {
 }
 
 impl VisualFiles {
-    /// Reads what the links of the robot look like: by the names of the links in its file. Adds
+    /// Reads the appearance of the links of the robot: by the names of the links in its file. Adds
     /// a warning for each visual shape that can't be read (W034, W036, W037).
     pub fn robot(&self, found: &mut Diagnostics) -> BTreeMap<String, SeenLink> {
         let RobotPlace {
@@ -42,7 +42,7 @@ impl VisualFiles {
         robot::seen(files, profile, packages, found)
     }
 
-    /// Reads what a model of an object looks like, without its moving parts. Frame: the model's.
+    /// Reads the appearance of a model of an object, without its moving parts. Frame: the model's.
     /// `None` if it looks like its collision shapes. Adds a warning for each visual shape that can't
     /// be read (W034, W035, W036, W037).
     pub fn model(&self, name: &str, found: &mut Diagnostics) -> Option<Vec<SeenPart>> {

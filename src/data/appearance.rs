@@ -1,4 +1,4 @@
-//! What bodies look like: their visual shapes and colours, for pictures. The simulation reads none
+//! The appearance of bodies: their visual shapes and colours, for pictures. The simulation reads none
 //! of it.
 
 use std::collections::BTreeMap;
@@ -47,7 +47,7 @@ pub struct SeenPart {
     pub colour: Option<Colour>,
 }
 
-/// What a link of a model's file looks like.
+/// The appearance of a link of a model's file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SeenLink {
     /// Its visual shapes or, without these, its collision shapes. Frame: the link's.
@@ -56,7 +56,7 @@ pub struct SeenLink {
     pub has_look: bool,
 }
 
-/// What the bodies of a campaign look like, as far as their files say so.
+/// The appearance of the bodies of a campaign, as far as their files say so.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Appearances {
     /// By the name of the link in traces: `robot/LINK`. Frame: the link's.

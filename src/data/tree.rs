@@ -75,7 +75,7 @@ pub struct TreeSolid {
 pub enum TreeColour {
     /// The colour of all of it.
     Whole(Colour),
-    /// The colour of what has none of its own in the file of a mesh.
+    /// The colour of parts without one of their own in the file of a mesh.
     Rest(Colour),
     /// It is invisible.
     Clear,

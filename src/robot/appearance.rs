@@ -1,4 +1,4 @@
-//! What the simulated links look like, which are merged from several links of the file.
+//! The appearance of the simulated links, which are merged from several links of the file.
 
 use std::collections::BTreeMap;
 
@@ -6,7 +6,7 @@ use crate::RobotModel;
 use actcheck_data::{SeenLink, SeenPart};
 
 impl RobotModel {
-    /// Returns what the simulated links look like by their names in traces, from the file's links
+    /// Returns the appearance of the simulated links by their names in traces, from the file's links
     /// by theirs. Simulated links that look like their collision shapes are left out. Frame: the
     /// link's.
     pub fn seen(&self, of_file: &BTreeMap<String, SeenLink>) -> BTreeMap<String, Vec<SeenPart>> {

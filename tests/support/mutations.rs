@@ -38,7 +38,7 @@ const ODD: [&str; 12] = [
 ];
 
 /// The CPU time of this thread: a case on a busy machine is not a slow one. The time since `begun`
-/// where the system does not tell it.
+/// on systems without such a file.
 fn thread_time(begun: Instant) -> Duration {
     let ticks = std::fs::read_to_string("/proc/thread-self/stat").ok();
     let ticks = ticks.and_then(|text| {

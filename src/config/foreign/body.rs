@@ -51,7 +51,7 @@ pub(crate) struct SdfModel {
 #[derive(Default)]
 pub(crate) struct Body {
     pub(crate) parts: Vec<Part>,
-    /// What it looks like, if visual shapes are read.
+    /// Its appearance, if visual shapes are read.
     pub(crate) seen: SeenLink,
     /// Masses of the links that state one.
     pub(crate) masses: Vec<Mass>,
@@ -123,7 +123,7 @@ impl Body {
         }
     }
 
-    /// Returns what the model at this pose looks like, without the bodies that joints move; `None`
+    /// Returns the appearance of the model at this pose, without the bodies that joints move; `None`
     /// if it looks like its collision shapes. Frame: the model's.
     pub(crate) fn seen_in_model(mut self, pose: &Isometry3<f64>) -> Option<Vec<SeenPart>> {
         let (model_from_file, _) = self.frame(pose);

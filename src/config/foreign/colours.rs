@@ -19,7 +19,7 @@ pub(crate) fn whole(channels: &[f64]) -> Option<TreeColour> {
     colour(channels).map(|colour| colour.map_or(TreeColour::Clear, TreeColour::Whole))
 }
 
-/// As [`whole`], but for what has no colour in its mesh file, as RViz does.
+/// As [`whole`], but for parts without a colour in their mesh file, as RViz does.
 pub(crate) fn rest(channels: &[f64]) -> Option<TreeColour> {
     colour(channels).map(|colour| colour.map_or(TreeColour::Clear, TreeColour::Rest))
 }

@@ -81,7 +81,7 @@ pub(crate) fn read(found: &Found, lookup: &Lookup) -> Result<Read, Diagnostics> 
     })
 }
 
-/// Reads what a model looks like, without its moving parts. Frame: the model's. Faults of visual
+/// Reads the appearance of a model, without its moving parts. Frame: the model's. Faults of visual
 /// shapes are reported as warnings. `None` if it looks like its collision shapes, or can't be read.
 pub(crate) fn seen(
     found: &Found,

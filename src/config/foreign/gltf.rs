@@ -718,7 +718,7 @@ impl AccessorElements {
 
 impl Document {
     /// The colour of a primitive's material; `None` if it has none, or a texture, which is not
-    /// read. Faults of materials are no faults of their mesh.
+    /// read. A mesh whose material has a fault is read all the same.
     fn colour(&self, primitive: &Primitive) -> Option<Colour> {
         let idx = usize::try_from(primitive.material.as_ref()?.as_u64()?).ok()?;
         let material = self.materials.as_ref()?.get(idx)?;

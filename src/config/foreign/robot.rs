@@ -60,7 +60,7 @@ pub(crate) fn read(
     Some(complete(bare, path, lookup, found))
 }
 
-/// Reads what the links look like, in their frames. `without` names those whose collision shapes
+/// Reads the appearance of the links, in their frames. `without` names those whose collision shapes
 /// are left out. Faults of visual shapes are reported as warnings; the text has no others.
 pub(crate) fn seen(
     source: &Source,

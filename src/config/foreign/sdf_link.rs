@@ -115,7 +115,7 @@ pub(crate) fn read(
     body
 }
 
-/// Reads what a link looks like: its visual shapes, or its collision shapes if it has none or one
+/// Reads the appearance of a link: its visual shapes, or its collision shapes if it has none or one
 /// has a fault.
 fn look(
     link: Node,

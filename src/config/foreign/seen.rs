@@ -1,4 +1,4 @@
-//! Reads what the links of a model look like, for pictures: their visual shapes, with colours.
+//! Reads the appearance of the links of a model, for pictures: their visual shapes, with colours.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! What links and objects look like, by the files of each format.
+//! The appearance of links and objects, by the files of each format.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -56,7 +56,7 @@ fn gltf() -> String {
     )
 }
 
-/// What the links of a robot look like, and the messages of the warnings.
+/// The appearance of the links of a robot, and the messages of the warnings.
 fn seen(files: &[(&str, String)], main: &str) -> (BTreeMap<String, SeenLink>, Diagnostics) {
     let folder = folder("", files);
     let path = folder.path().join(main);
@@ -122,7 +122,7 @@ fn meshes_of_each_format_have_their_colours() {
     }
 }
 
-/// As RViz, the colour of a URDF is that of what has none in its mesh file.
+/// As in RViz, the colour of a URDF is that of parts without one in their mesh file.
 #[test]
 fn materials_of_a_urdf_may_be_defined_once() {
     let named = "<material name=\"m\"/>";
@@ -239,7 +239,7 @@ fn a_robot_in_mjcf_has_the_colours_of_its_geoms() {
     assert_eq!(colours(&links["a"].parts), [(Some(RED), 4)], "{found:?}");
 }
 
-/// Objects are moved so that their middle is above the origin: so is what they look like.
+/// Objects are moved so that their middle is above the origin: so is their appearance.
 #[test]
 fn an_object_has_its_visual_meshes_in_the_frame_of_its_model() {
     let object = |inside: &str| {

@@ -31,19 +31,19 @@ pub type ReplayedRun = (RunDetail, Option<Trace>, Vec<Explained>);
 #[derive(Debug, Default)]
 pub struct Replays {
     shapes: Shapes,
-    /// What the bodies of campaigns look like, by the campaign's id.
+    /// The appearance of the bodies of campaigns, by the campaign's id.
     appearances: BTreeMap<String, Arc<Appearances>>,
     runs: BTreeMap<String, String>,
     bytes: usize,
 }
 
 impl Replays {
-    /// Whether it is known what the bodies of a campaign look like.
+    /// Whether the appearance of the bodies of a campaign is known.
     pub fn knows(&self, campaign: &str) -> bool {
         self.appearances.contains_key(campaign)
     }
 
-    /// Sets what the bodies of a campaign look like, for runs that are added from now on.
+    /// Sets the appearance of the bodies of a campaign, for runs that are added from now on.
     pub fn set_appearances(&mut self, campaign: &str, appearances: Arc<Appearances>) {
         self.appearances.insert(campaign.to_owned(), appearances);
     }
@@ -141,7 +141,7 @@ impl Replays {
             .collect();
         let appearances = self.appearances.get(campaign).cloned().unwrap_or_default();
         let shapes = &mut self.shapes;
-        // The numbers of a body's shape, and of what it looks like if its shape is needed, too.
+        // The numbers of a body's shape, and of its appearance if its shape is needed, too.
         let mut body = |name: &str| -> Option<Value> {
             if let Some(parts) = appearances.links.get(name) {
                 return Some(
@@ -212,7 +212,7 @@ fn place(run: &RunDetail) -> (&str, &[ObjectDetail]) {
     (&run.row.campaign, &run.objects)
 }
 
-/// What an object looks like, with the name of its model.
+/// The appearance of an object, with the name of its model.
 fn look<'a>(
     appearances: &'a Appearances,
     object: &ObjectDetail,
@@ -395,7 +395,7 @@ mod tests {
 
     /// The mesh of a robot is in the page once, however many runs it has.
     #[test]
-    fn what_bodies_look_like_is_shared_by_all_runs_of_a_campaign() {
+    fn the_appearance_of_bodies_is_shared_by_all_runs_of_a_campaign() {
         let look = |red: u8| {
             vec![SeenPart {
                 part: Part {

@@ -10,7 +10,7 @@ use actcheck_data::{BodyState, Colour, Form, Mesh, Part, SeenPart, Shape};
 #[derive(Debug, Default)]
 pub(super) struct Shapes {
     known: BTreeMap<String, usize>,
-    /// Numbers of what bodies look like, by campaign and by link or model.
+    /// Numbers of the appearance of bodies, by campaign and by link or model.
     seen: BTreeMap<[String; 2], usize>,
     forms: Vec<Value>,
 }
@@ -34,7 +34,7 @@ impl Shapes {
         self.number(json!([{ "at": [x, y, z, 0, 0, 0, 1], "kind": "box", "size": size }]))
     }
 
-    /// Returns the index of what a link or a model of a campaign looks like.
+    /// Returns the index of the appearance of a link or a model of a campaign.
     pub fn of_seen(&mut self, [campaign, name]: [&str; 2], parts: &[SeenPart]) -> usize {
         let key = [campaign, name].map(str::to_owned);
         if let Some(number) = self.seen.get(&key) {

@@ -263,7 +263,7 @@ impl Drawing {
         }
     }
 
-    /// Draws pixels over what is there.
+    /// Draws pixels over the drawing so far.
     pub(super) fn image(&mut self, pixels: Pixmap, at: [f64; 2], opacity: f64) {
         self.marks.push((
             self.clip,

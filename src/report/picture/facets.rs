@@ -1,4 +1,4 @@
-//! Draws what bodies look like: the nearest surface at each pixel, shaded, with dark edges.
+//! Draws the appearance of bodies: the nearest surface at each pixel, shaded, with dark edges.
 
 use nalgebra::{Isometry3, Point3, Vector3};
 use tiny_skia::{Pixmap, PremultipliedColorU8};
@@ -12,7 +12,7 @@ use actcheck_data::{Colour, SeenPart, Shape, convex_hull};
 const SAMPLES: usize = 2;
 /// A surface that is further behind its neighbour has an edge. Unit: metres.
 const EDGE_M: f64 = 0.02;
-/// Brightness of an edge, of a surface that no light reaches, and what light adds.
+/// Brightness of an edge and of a surface that no light reaches, and the share that light adds.
 const EDGE: f64 = 0.5;
 const SHADE: f64 = 0.5;
 const LIGHT: f64 = 0.55;

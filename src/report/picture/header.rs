@@ -37,13 +37,13 @@ pub struct Caption {
     pub charts: Vec<Chart>,
     /// Role of each object, by id.
     pub roles: BTreeMap<String, Role>,
-    /// What bodies look like, by the id of the object or the name of the link in traces. All others
+    /// The appearance of bodies, by the id of the object or the name of the link in traces. All others
     /// are drawn by the shapes in the trace.
     pub seen: BTreeMap<String, Vec<SeenPart>>,
 }
 
 impl Caption {
-    /// Adds what the bodies of the run's campaign look like.
+    /// Adds the appearance of the bodies of the run's campaign.
     #[must_use]
     pub fn with_appearances(self, run: &RunDetail, appearances: &Appearances) -> Self {
         let objects = run.objects.iter().filter_map(|object| {

@@ -3,7 +3,7 @@
 //!
 //! From a run to pixels: [`run`] lays out the panels, [`window`] selects the region that each
 //! shows, [`outline`] and [`paths`] compute the outlines of bodies and the paths of motions,
-//! [`facets`] shades the bodies whose files say what they look like, and [`labels`] places names. The result is a [`drawing`] of plain shapes, which [`svg`] writes and
+//! [`facets`] shades the bodies whose files state their appearance, and [`labels`] places names. The result is a [`drawing`] of plain shapes, which [`svg`] writes and
 //! [`png`] rasterises, with glyphs from [`font`]. [`patterns`] draws the runs of patterns in the
 //! same way, [`collisions`] the things that were hit, and [`charts`] the signals that decided
 //! properties about time. [`robot`] draws a robot in its postures.

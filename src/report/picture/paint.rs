@@ -38,7 +38,7 @@ pub(super) const ROBOT: Style = Style::both(
 );
 /// Links without a colour in their files.
 pub(super) const PLAIN_ROBOT: u32 = 0x9d_b0c4;
-/// Opacity of a robot that is drawn as it looks: what it holds shines through.
+/// Opacity of a robot that is drawn as it looks: the thing in its hand shines through.
 pub(super) const ROBOT_OPACITY: f64 = 0.82;
 pub(super) const PRESSED: Style = Style::both(
     Paint::solid(FAILED),

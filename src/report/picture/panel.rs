@@ -29,7 +29,7 @@ pub(super) struct PanelData<'a> {
     pub(super) paths: &'a [Path],
     pub(super) pressed: Option<Pressed>,
     pub(super) roles: &'a BTreeMap<String, Role>,
-    /// What bodies look like, by the id of the object or the name of the link in traces.
+    /// The appearance of bodies, by the id of the object or the name of the link in traces.
     pub(super) seen: &'a BTreeMap<String, Vec<SeenPart>>,
     pub(super) forms: BTreeMap<&'a str, &'a Form>,
 }
@@ -124,7 +124,7 @@ fn form(data: &PanelData<'_>, body: &BodyState, window: &Window) -> Vec<Vec<[f64
     }
 }
 
-/// Draws furniture, then objects: what they look like, or their shapes. Objects have an outline in
+/// Draws furniture, then objects: their appearance, or their shapes. Objects have an outline in
 /// the colour of their role.
 fn bodies(drawing: &mut Drawing, data: &PanelData<'_>, shown: &[&BodyState], window: &Window) {
     for is_fixed in [true, false] {
@@ -163,7 +163,7 @@ fn show(drawing: &mut Drawing, facets: &Facets, window: &Window, opacity: f64) {
     }
 }
 
-/// Draws all links of the robot, also those that are fixed to a fixed base: what they look like, or
+/// Draws all links of the robot, also those that are fixed to a fixed base: their appearance, or
 /// their shapes. Returns the rectangles around them.
 fn robot(
     drawing: &mut Drawing,
@@ -211,7 +211,7 @@ fn robot(
             [window.panel.left, window.panel.top],
             paint::ROBOT_OPACITY,
         );
-        // The hand must not hide what it holds.
+        // The hand must not hide the thing in it.
         for body in snapshot.bodies.iter().filter(|body| !body.fixed) {
             if window.overlaps(&Bounds::of(body)) {
                 outline(drawing, data, body, window);
