@@ -31,6 +31,9 @@ struct Begun {
     reason: Option<String>,
 }
 
+/// A contact: both bodies, the normal force, the force on the second one, and the point.
+type Contact = (String, String, f64, [f64; 3], [f64; 3]);
+
 /// An answer to `tick`.
 #[derive(Deserialize)]
 struct Ticked {
@@ -45,7 +48,7 @@ struct Ticked {
     #[serde(default)]
     objects: Vec<Vec<f64>>,
     #[serde(default)]
-    contacts: Vec<(String, String, f64, [f64; 3], [f64; 3])>,
+    contacts: Vec<Contact>,
 }
 
 impl MujocoPool {
