@@ -8,9 +8,13 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::Arc;
 
 use actcheck::base::{Files, Source};
+use actcheck::campaign::Env;
 use actcheck::config::{self, Overrides};
+use actcheck::data::Choices;
+use actcheck::scenario;
 use serde_json::Value;
 
 use crate::support::expected::assert_diagnostics;
@@ -402,4 +406,15 @@ fn a_fixed_arm_picks_an_object_seen_with_its_camera() {
         "{passed} of 6 runs passed fully with a lone object and no noise: {}",
         stdout(&output)
     );
+}
+
+/// A simulation compiles the robot again unless the scene has the profile of the campaign's robot.
+#[test]
+fn a_campaign_compiles_its_robot_once_for_all_scenes() {
+    for name in ["pick", "fixed_arm"] {
+        let config = root().join(format!("configs/{name}.toml"));
+        let env = Env::prepare(&config, &Overrides::default()).unwrap();
+        let scene = scenario::draw(&env.space, 0, &mut Choices::recorded(&[])).unwrap();
+        assert!(Arc::ptr_eq(&env.robot.profile, &scene.robot.profile));
+    }
 }
