@@ -193,7 +193,7 @@ mod tests {
         let few = SeenPart::reduced(parts, 101);
         assert!(
             few.iter()
-                .map(|seen| count(&[seen.clone()])[0].1)
+                .map(|seen| count(std::slice::from_ref(seen))[0].1)
                 .sum::<usize>()
                 <= 101
         );

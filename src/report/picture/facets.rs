@@ -398,7 +398,11 @@ mod tests {
             };
             let mut facets = facets(View::TOP, false);
             let seen = SeenPart { part, colour: None };
-            facets.add(&[seen.clone()], &Isometry3::identity(), 0x00_ff00);
+            facets.add(
+                std::slice::from_ref(&seen),
+                &Isometry3::identity(),
+                0x00_ff00,
+            );
             for (x, y) in [(0.5, 0.5), (0.43, 0.5), (0.5, 0.57)] {
                 assert_eq!(at(&facets, x, y), Some(1), "{seen:?}");
             }
