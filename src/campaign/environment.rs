@@ -1,5 +1,6 @@
 //! Prepares and checks everything that a campaign needs before its first run.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -32,6 +33,8 @@ pub struct Env {
     pub ontology: Ontology,
     /// Its robot, compiled for all simulations.
     pub robot: Robot,
+    /// The basis of all values of the robot that its profile does not state, by their keys.
+    pub found_on_robot: BTreeMap<&'static str, String>,
     /// The space of scenes that it describes.
     pub space: Space,
     /// The rules of all properties, ready to judge.
@@ -189,6 +192,7 @@ impl Env {
         let robot = solids::complete_robot(&campaign.robot)
             .map_err(|error| faults.push(error.diagnostic()))
             .ok();
+        let (robot, found_on_robot) = robot.unzip();
         if let Some(Err(error)) = robot.as_ref().map(Robot::check) {
             faults.push(error.diagnostic());
         }
@@ -226,6 +230,7 @@ impl Env {
                     campaign,
                     ontology,
                     robot,
+                    found_on_robot: found_on_robot.unwrap_or_default(),
                     space,
                     rules,
                     rule_budget,

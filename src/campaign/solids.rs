@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use actcheck_base::{Below, Diagnostic, Diagnostics, Digest};
 use actcheck_config::Campaign;
 use actcheck_data::{Mesh, ObjectModel, Part, RobotCore, Shape, StatedRobot};
-use actcheck_world::{self as world, DecompositionFault, Robot, RobotModel};
+use actcheck_world::{self as world, Completed, DecompositionFault, Robot, RobotModel};
 
 /// Cache folder in the history's folder.
 const FOLDER: &str = "hulls";
@@ -117,18 +117,22 @@ pub fn proposed_robot(
 }
 
 /// Finds the roles that the robot's profile leaves out, limits the force of its grip to that of its
-/// motors, and returns the compiled robot: once for all runs of a campaign.
+/// motors, and returns the compiled robot: once for all runs of a campaign. Returns also the basis of
+/// all values that the profile does not state.
 ///
 /// # Errors
 /// [`world::RobotError`] if they can't be found.
-pub(super) fn complete_robot(stated: &StatedRobot) -> Result<Robot, world::RobotError> {
-    let mut robot = Robot::compile(&Arc::new(world::complete(stated)?.profile))?;
+pub(super) fn complete_robot(
+    stated: &StatedRobot,
+) -> Result<(Robot, BTreeMap<&'static str, String>), world::RobotError> {
+    let Completed { profile, notes } = world::complete(stated)?;
+    let mut robot = Robot::compile(&Arc::new(profile))?;
     let limit_n = robot.grip_limit_n();
     if limit_n < robot.profile.hand.grip_force_n {
         // The links and joints don't depend on the force.
         Arc::make_mut(&mut robot.profile).hand.grip_force_n = limit_n;
     }
-    Ok(robot)
+    Ok((robot, notes))
 }
 
 /// Returns the simulated links of a campaign's robot. Its meshes are decomposed only if its profile

@@ -86,6 +86,15 @@ pub fn check(args: &CheckArgs, stop: &Arc<AtomicBool>) -> Result<(), Diagnostics
         env.campaign.robot.core.name,
     ));
     output::print(&env.masses_and_sizes());
+    if !env.found_on_robot.is_empty() {
+        let found = env.found_on_robot.iter();
+        let found: String = found
+            .map(|(key, note)| format!("  {key}: {note}\n"))
+            .collect();
+        output::print_prose(&format!(
+            "values that the robot's profile does not state:\n{found}"
+        ));
+    }
     if args.mend {
         output::print_prose(
             "nothing to mend: all moments of inertia of the robot's moving links are possible\n",

@@ -40,7 +40,7 @@ const USUAL: [&str; 7] = [
 const MOST_FINGER_JOINTS: usize = 8;
 
 /// Keys that depend on another key.
-const DEPENDENT: [(&str, &str); 10] = [
+const DEPENDENT: [(&str, &str); 11] = [
     ("suction_force_n", "suction_radius_m"),
     ("suction_radius_m", "suction_force_n"),
     ("suction_friction", "suction_force_n"),
@@ -51,6 +51,7 @@ const DEPENDENT: [(&str, &str); 10] = [
     ("camera_offset_m", "camera_link"),
     ("home", "arm_joints"),
     ("postures", "arm_joints"),
+    ("postures", "home"),
 ];
 
 /// Rotation of the camera's frame relative to a link whose name contains `optical`, if the profile
