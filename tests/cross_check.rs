@@ -293,6 +293,7 @@ fn a_skill_runs_in_mujoco_in_a_closed_loop() {
         "{one:#}"
     );
     assert_eq!(one["settings"].as_array().unwrap().len(), 1, "{one:#}");
+    assert_eq!(one["closed_loop"], true);
 }
 
 /// A whole task in MuJoCo: preconditions are decided by its contacts.

@@ -184,6 +184,7 @@ pub fn cross_check(args: &CrossCheckArgs) -> Result<u8, Diagnostics> {
         campaign: args.campaign.clone(),
         version: played.version,
         imported,
+        closed_loop: args.closed_loop,
         finger_friction: args.finger_friction,
         comparison: EngineComparison {
             plain: PLAIN,

@@ -41,6 +41,8 @@ const GROUPS: [Group; 2] = [
             "import",
             "check-episodes",
             "cross-check",
+            "relate",
+            "propose-properties",
             "calibrate",
             "export",
             "check-oracles",

@@ -173,7 +173,8 @@ fn a_visual_mesh_that_is_missing_is_one_warning_at_its_place() {
     };
     assert_eq!((fault.code, fault.severity), ("W037", Severity::Warning));
     let span = fault.span.clone().expect("it has a place");
-    assert!(text[span].contains("missing.stl"), "{fault:?}");
+    assert_eq!(&text[span], "<mesh", "{fault:?}");
+    assert!(fault.message.contains("missing.stl"), "{fault:?}");
     for name in ["a", "b"] {
         let [seen] = links[name].parts.as_slice() else {
             panic!("{:?}", links[name])

@@ -290,11 +290,12 @@ fn solids(
         }
         let pose = origin(node, reader);
         let geometry = reader.required(node, "geometry");
-        let geometry = geometry.and_then(|node| Some((node, read_geometry(node, meshes, reader)?)));
-        let (Some(pose), Some((node, geometry))) = (pose, geometry) else {
+        let geometry =
+            geometry.and_then(|shape| Some((shape, read_geometry(shape, meshes, reader)?)));
+        let (Some(pose), Some((shape, geometry))) = (pose, geometry) else {
             continue;
         };
-        let shape = xml::first(node).unwrap_or(node);
+        let shape = xml::first(shape).unwrap_or(shape);
         found.push(TreeSolid {
             pose,
             geometry,

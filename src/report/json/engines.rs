@@ -30,6 +30,7 @@ pub fn engines_json(summary: &EngineSummary) -> Value {
     json!({
         "campaign": summary.campaign,
         "mujoco": summary.version,
+        "closed_loop": summary.closed_loop,
         "imported": summary.imported,
         "all_properties": agreement(comparison.agreement()),
         "properties": properties,

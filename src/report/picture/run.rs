@@ -213,8 +213,8 @@ mod tests {
         }
     }
 
-    /// For each panel: the number of links that are drawn by their shapes; and the number of
-    /// images.
+    /// For each panel with some: the number of links that are drawn by their shapes, without the
+    /// sample of the legend, which is the last one; and the number of images.
     fn drawn(caption: &Caption) -> (Vec<usize>, usize) {
         let drawing = run_picture(caption, &trace()).expect("it has states");
         let links = drawing.marks.iter().filter_map(|(_, mark)| match mark {
@@ -225,7 +225,13 @@ mod tests {
             .marks
             .iter()
             .filter(|(_, mark)| matches!(mark, Mark::Image { .. }));
-        (links.collect(), images.count())
+        let mut links: Vec<usize> = links.collect();
+        assert_eq!(
+            links.pop(),
+            Some(1),
+            "the legend explains the robot's colour"
+        );
+        (links, images.count())
     }
 
     #[test]

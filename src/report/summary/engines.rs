@@ -12,6 +12,8 @@ pub struct EngineSummary {
     pub version: String,
     /// Id of the campaign with MuJoCo's courses.
     pub imported: Option<String>,
+    /// Whether the skill ran in MuJoCo, too, instead of MuJoCo playing its setpoints from here.
+    pub closed_loop: bool,
     /// Factor by which the friction of the fingers is wrong on purpose.
     pub finger_friction: f64,
     /// The comparison.
@@ -35,6 +37,15 @@ impl EngineSummary {
             engine: format!("MuJoCo {}", self.version),
             imported: self.imported.clone(),
             runs: runs.map(|run| (run.run.clone(), run.contested())).collect(),
+        }
+    }
+
+    /// How the runs were made in MuJoCo, in words.
+    pub(crate) fn way(&self) -> &'static str {
+        if self.closed_loop {
+            "where the skill ran anew"
+        } else {
+            "with the same setpoints"
         }
     }
 

@@ -46,8 +46,12 @@ pub(crate) fn settings_table(summary: &EngineSummary) -> Table {
     table
 }
 
+/// An agreement in words; empty without comparisons.
 fn counted(agreement: Agreement) -> String {
-    format!("{} of {}", agreement.agree, agreement.of)
+    match agreement.of {
+        0 => String::new(),
+        of => format!("{} of {of}", agreement.agree),
+    }
 }
 
 /// The 95 % interval of an agreement in words; empty without comparisons.

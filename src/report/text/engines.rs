@@ -18,15 +18,18 @@ pub fn engines_text(summary: &EngineSummary, page: Page) -> String {
     let mut out = String::new();
     let _ = writeln!(
         out,
-        "{n_runs} runs of {} in MuJoCo {}, with the same setpoints: all properties agree in {} ({})\n",
+        "{n_runs} runs of {} in MuJoCo {}, {}: all properties agree in {} ({})\n",
         summary.campaign,
         summary.version,
+        summary.way(),
         all.agree,
         percent_interval(all)
     );
     out += &engines_table(summary).render(TableFormat::Table, page);
-    out.push('\n');
-    out += &settings_table(summary).render(TableFormat::Table, page);
+    if !summary.closed_loop {
+        out.push('\n');
+        out += &settings_table(summary).render(TableFormat::Table, page);
+    }
     if let Some((setting, gain)) = comparison.likely_cause() {
         let _ = writeln!(
             out,
