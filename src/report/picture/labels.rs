@@ -9,8 +9,9 @@ const GAP_PX: f64 = 2.0;
 /// Cost of a label that covers the thing that it names: more than that of the farthest place beside
 /// it. Only a thing around which the panel has no room, such as a table that fills it, is covered.
 const COVERS: f64 = 1e3;
-/// Cost of a label that hides other objects with all of its area. Unit: pixels.
-const HIDES_PX: f64 = 40.0;
+/// Cost of a label that hides other objects with all of its area: a label farther away, with a
+/// line to its object, is better. Unit: pixels.
+const HIDES_PX: f64 = 200.0;
 /// Cost of a label that lies on lines or on the robot with all of its area. Unit: pixels.
 const BUSY_PX: f64 = 25.0;
 /// Largest width of a label, as a share of the panel's: others would lie across everything.
@@ -267,5 +268,46 @@ mod tests {
         let texts = placed("table_1", PANEL.grown(30.0), vec![glass]);
         assert!(texts.len() == 1 && PANEL.holds(&texts[0]), "{texts:?}");
         assert_eq!(texts[0].shared(&glass), 0.0);
+    }
+
+    /// A box between two cans, with another label below it.
+    #[test]
+    fn a_label_is_rather_far_away_than_on_another_thing() {
+        let thing = |left: f64| Rect {
+            left,
+            top: 150.0,
+            width: 18.0,
+            height: 40.0,
+        };
+        let things = vec![thing(200.0), thing(220.0), thing(240.0)];
+        let mut drawing = Drawing::new(560.0);
+        let mut labels = Labels::new(PANEL, things.clone());
+        for (text, at) in ["can_1", "box_1", "can_2"].into_iter().zip(&things) {
+            let label = Label {
+                text,
+                size: 11.0,
+                bold: false,
+                rgb: paint::INK,
+                at: *at,
+            };
+            labels.keep_out(Rect {
+                left: 180.0,
+                top: 192.0,
+                width: 100.0,
+                height: 14.0,
+            });
+            labels.write(&mut drawing, &label);
+        }
+        let texts: Vec<Rect> = labels
+            .taken
+            .iter()
+            .filter(|rect| rect.left != 180.0)
+            .copied()
+            .collect();
+        assert_eq!(texts.len(), 3);
+        for text in &texts {
+            let hidden: f64 = things.iter().map(|thing| thing.shared(text)).sum();
+            assert_eq!(hidden, 0.0, "{texts:?}");
+        }
     }
 }

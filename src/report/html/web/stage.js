@@ -89,6 +89,10 @@ class Stage {
       return near([x, y, z + above(forms[course.tracks[slot].form])]);
     });
     const things = course.tracks.map((track, slot) => [track, slot]).filter(([track]) => !track.name.startsWith("robot/"));
+    things.forEach(([track]) => labels.spare((secs) => {
+      const [x, y, z] = course.position(track.name, secs);
+      return [[x, y, z], [x, y, z + above(forms[track.form])]];
+    }));
     things.filter(([track]) => track.role === "target").forEach(([track, slot]) => body(track, slot));
     if (course.grasp) labels.add("hand", "gripper", (secs) => { const [x, y, z] = course.hand(secs); return [x, y, z + 0.06]; });
     things.filter(([track]) => track.role !== "target").forEach(([track, slot]) => body(track, slot));
@@ -99,7 +103,7 @@ class Stage {
     }
     for (const still of replay.still.filter(({ kind }) => kind !== "Wall" && kind !== "robot")) {
       const [x, y, z] = still.at;
-      labels.add("other", still.name, () => near([x, y, z + above(forms[still.form])]));
+      labels.add("other furniture", still.name, () => near([x, y, z + above(forms[still.form])]));
     }
   }
 
