@@ -270,44 +270,24 @@ mod tests {
         assert_eq!(texts[0].shared(&glass), 0.0);
     }
 
-    /// A box between two cans, with another label below it.
+    /// The middle of a crowd.
     #[test]
     fn a_label_is_rather_far_away_than_on_another_thing() {
-        let thing = |left: f64| Rect {
-            left,
-            top: 150.0,
+        let thing = |column: f64, row: f64| Rect {
+            left: 200.0 + 20.0 * column,
+            top: 80.0 + 44.0 * row,
             width: 18.0,
             height: 40.0,
         };
-        let things = vec![thing(200.0), thing(220.0), thing(240.0)];
-        let mut drawing = Drawing::new(560.0);
-        let mut labels = Labels::new(PANEL, things.clone());
-        for (text, at) in ["can_1", "box_1", "can_2"].into_iter().zip(&things) {
-            let label = Label {
-                text,
-                size: 11.0,
-                bold: false,
-                rgb: paint::INK,
-                at: *at,
-            };
-            labels.keep_out(Rect {
-                left: 180.0,
-                top: 192.0,
-                width: 100.0,
-                height: 14.0,
-            });
-            labels.write(&mut drawing, &label);
-        }
-        let texts: Vec<Rect> = labels
-            .taken
-            .iter()
-            .filter(|rect| rect.left != 180.0)
-            .copied()
+        let rows = (0..5).flat_map(|row| (0..9).map(move |column| (column, row)));
+        let things: Vec<Rect> = rows
+            .map(|(column, row)| thing(f64::from(column), f64::from(row)))
             .collect();
-        assert_eq!(texts.len(), 3);
-        for text in &texts {
-            let hidden: f64 = things.iter().map(|thing| thing.shared(text)).sum();
-            assert_eq!(hidden, 0.0, "{texts:?}");
-        }
+        let texts = placed("box_1", thing(4.0, 2.0), things.clone());
+        let [text] = texts.as_slice() else {
+            panic!("{texts:?}")
+        };
+        let hidden: f64 = things.iter().map(|thing| thing.shared(text)).sum();
+        assert!(hidden == 0.0 && PANEL.holds(text), "{text:?}");
     }
 }
