@@ -1,0 +1,749 @@
+"""Keeps a node in step with the simulation, from inside its process and without a change to its source.
+
+Simulated time stands still while nodes compute. The simulation gives the processes turns, one at a time. In its turn, a
+process does everything that is ready and then says that it is idle; between turns it does nothing. Within a process one
+thread runs at a time: it has the *baton*. A thread that waits (in an executor, for a lock, a condition or a time) gives the
+baton away, and enters a queue when it is woken. So the order of all callbacks is the same every time, also with a
+multi-threaded executor.
+
+Waiting times are simulated ones: `time.sleep(0.1)` in a callback and `spin_once(timeout_sec=0.1)` end when the simulated
+time is 0.1 s later, as on a robot whose clocks agree. Messages are reliable, whatever a node asks for.
+
+Before the first turn the process is free: it starts as it would without the simulation.
+
+Only the standard library and rclpy are used: this runs in the nodes' Python, which need not have actcheck.
+"""
+
+import _thread
+import concurrent.futures.thread
+import copy
+import json
+import os
+import socket
+import struct
+import sys
+import threading
+import time
+import weakref
+from collections import deque
+
+_LENGTH = struct.Struct("<I")
+_sleep = time.sleep
+_wall = time.monotonic
+_Lock = _thread.allocate_lock
+_me = _thread.get_ident
+_STANDARD = os.path.dirname(os.__file__)
+#: Kinds of entities of a wait set.
+_KINDS = ("subscription", "timer", "client", "service", "guard_condition")
+#: How often a free process looks whether it is held. Unit: seconds.
+_LOOK_S = 0.02
+#: Topic on which a process says that all of its messages were sent.
+MARK = "/actcheck/mark"
+
+
+class _Parked:
+    """A thread that waits, or the work of a pool that waits for a thread."""
+
+    __slots__ = ("wake", "ident", "woken", "queued", "pool", "work")
+
+    def __init__(self, pool=None, work=None):
+        self.wake = _Lock()
+        self.wake.acquire()
+        self.ident = None if work else _me()
+        self.woken = self.queued = False
+        self.pool, self.work = pool, work
+
+
+class _Pool:
+    """Stands in for the thread pool of a multi-threaded executor: its threads take turns."""
+
+    def __init__(self, keeper, most):
+        self.keeper, self.most, self.active = keeper, most, 0
+
+    def submit(self, work):
+        """Queues work; it begins when a thread of the pool is free and the baton comes round."""
+        with self.keeper.lock:
+            self.keeper.ready(_Parked(self, work))
+            self.keeper.grant()
+
+    def start(self, parked):
+        """Begins queued work. Called with the keeper's lock."""
+        self.active += 1
+        _thread.start_new_thread(self.perform, (parked.work,))
+
+    def perform(self, work):
+        keeper = self.keeper
+        if keeper.held:
+            keeper.holder = _me()
+        try:
+            work()
+        finally:
+            with keeper.lock:
+                self.active -= 1
+                if keeper.holder == _me():
+                    keeper.holder = None
+                keeper.grant()
+
+    def shutdown(self, wait=True, **_):
+        """Waits for the threads, for a while: they may sleep."""
+        since = _wall()
+        while wait and self.active and _wall() - since < 1.0:
+            _sleep(0.005)
+
+
+class Keeper:
+    """The turns and the baton of one process."""
+
+    def __init__(self, address):
+        self.lock = _Lock()
+        #: Whether the process acts only in its turns, and whether it is its turn.
+        self.held = self.open = False
+        #: Whether the simulation has gone: waiting is by the wall clock for good.
+        self.ended = False
+        #: The thread with the baton.
+        self.holder = None
+        self.queue = deque()
+        #: Executors that wait for something to do, and the activity at which each found nothing.
+        self.polls, self.polled, self.deadlines = {}, {}, {}
+        self.activity = 0
+        self.sleepers, self.serial = [], 0
+        self.now = 0
+        self.sends = self.foreign = self.marker = 0
+        self.faults, self.noted = [], set()
+        self.sources, self.nodes = weakref.WeakSet(), weakref.WeakSet()
+        #: Clock subscriptions whose marker has not come in this turn.
+        self.awaited = set()
+        #: Executors that have been in `wait`.
+        self.executors = set()
+        self.exempt = set()
+        self.connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.connection.connect(address)
+        self.writing = _Lock()
+        self.send({"hello": os.getpid(), "command": os.path.basename(sys.argv[0] if sys.argv else "")})
+        _thread.start_new_thread(self.serve, ())
+
+    # The connection to the simulation.
+
+    def send(self, message):
+        payload = json.dumps(message).encode()
+        with self.writing:
+            self.connection.sendall(_LENGTH.pack(len(payload)) + payload)
+
+    def receive(self):
+        return json.loads(self.take(_LENGTH.unpack(self.take(_LENGTH.size))[0]))
+
+    def take(self, count):
+        got = b""
+        while len(got) < count:
+            piece = self.connection.recv(count - len(got))
+            if not piece:
+                raise EOFError
+            got += piece
+        return got
+
+    def serve(self):
+        """Answers the simulation, in a thread of its own, until the connection ends; then the process is free."""
+        self.exempt.add(_me())
+        try:
+            while True:
+                message = self.receive()
+                if "turn" in message:
+                    self.turn(message["turn"], message["now"])
+                elif "hold" in message:
+                    self.hold(message["hold"])
+                elif "free" in message:
+                    self.free()
+                elif "graph" in message:
+                    self.send({"graph": self.graph()})
+                elif "where" in message:
+                    self.send({"where": self.where()})
+        except (EOFError, OSError):
+            self.free()
+
+    def hold(self, now):
+        with self.lock:
+            self.held, self.open, self.now = True, False, now
+        for node in list(self.nodes):
+            if not node._time_source.ros_time_is_active:
+                self.fault("wall clock", f"node {node.get_name()} does not use simulated time: its use_sim_time is false", None)
+        # Executors come in from their last free wait.
+        since = _wall()
+        while self.executors - set(self.polls) and _wall() - since < 2.0:
+            _sleep(0.002)
+        self.send({"held": len(self.executors)})
+
+    def free(self):
+        with self.lock:
+            self.held, self.ended = False, True
+            for _, _, parked in self.sleepers:
+                self.ready(parked, False)
+            self.sleepers.clear()
+            self.grant()
+
+    def turn(self, marker, now):
+        """Begins a turn; `grant` ends it."""
+        with self.lock:
+            self.marker, self.sends = marker, 0
+            # Everything that was sent before the turn arrives before its marker: nothing runs until then.
+            self.awaited = {
+                source._clock_sub.handle.pointer for source in self.sources if source._clock_sub is not None
+            }
+            if now > self.now:
+                self.now = now
+                due = sorted(entry[:2] for entry in self.sleepers if entry[0] <= now)
+                asleep = {entry[:2]: entry[2] for entry in self.sleepers}
+                self.sleepers = [entry for entry in self.sleepers if entry[0] > now]
+                for entry in due:
+                    self.ready(asleep[entry], False)
+            self.set_time()
+            self.open = True
+            self.polled.clear()
+            self.grant()
+
+    def set_time(self):
+        """Sets the clocks of all nodes of the process at once, so that no node is ahead of another."""
+        from rclpy.clock_type import ClockType
+        from rclpy.time import Time
+
+        moment = Time(nanoseconds=self.now, clock_type=ClockType.ROS_TIME)
+        for source in sorted(self.sources, key=lambda source: source._keeper_serial):
+            if source.ros_time_is_active and source._last_time_set != moment:
+                source._last_time_set = moment
+                for clock in list(source._associated_clocks):
+                    clock.set_ros_time_override(moment)
+
+    # The baton. These are called with the lock.
+
+    def ready(self, parked, woken=True):
+        """Puts a waiting thread into the queue."""
+        if not parked.queued:
+            parked.queued, parked.woken = True, woken
+            self.queue.append(parked)
+
+    def grant(self):
+        """Gives the baton to the next thread if it is free. If there is none, the turn is over."""
+        if not self.held:
+            waiting, self.queue, self.holder = self.queue, deque(), None
+            for parked in waiting:
+                self.begin(parked)
+            for parked in self.polls.values():
+                parked.wake.release()
+            self.polls.clear()
+            return
+        if not self.open or self.holder is not None:
+            return
+        for place, parked in enumerate(self.queue):
+            if parked.work is None or parked.pool.active < parked.pool.most:
+                del self.queue[place]
+                self.activity += 1
+                self.holder = parked.ident or -1
+                self.begin(parked)
+                return
+        for ident, parked in self.polls.items():
+            if self.polled.get(ident) != self.activity:
+                del self.polls[ident]
+                self.holder = ident
+                parked.wake.release()
+                return
+        if self.foreign == 0:
+            self.open = False
+            faults, self.faults = self.faults, []
+            if self.sends:
+                self.mark()
+            self.send({"idle": self.marker, "sends": self.sends, "faults": faults})
+
+    def begin(self, parked):
+        if parked.work is None:
+            parked.wake.release()
+        elif parked.pool.active < parked.pool.most:
+            parked.pool.start(parked)
+        else:
+            self.queue.append(parked)
+
+    def mark(self):
+        """Sends a message behind all others of this turn, so that the simulation knows when they have arrived."""
+        from rosgraph_msgs.msg import Clock
+
+        message = Clock()
+        message.clock.sec = self.marker
+        message.clock.nanosec = os.getpid()
+        for node in sorted(self.nodes, key=lambda node: node._keeper_serial):
+            try:
+                with node._keeper_mark.handle:
+                    _publish(node._keeper_mark.handle, message)
+                return
+            except Exception:  # The node was destroyed: the next one.
+                continue
+
+    # Waiting.
+
+    def park(self, parked, seconds=None, until=None):
+        """Gives the baton away and waits until `parked` is woken, at most for some seconds or until a simulated time.
+
+        Returns whether it was woken, and not by the time.
+        """
+        asleep = False
+        while not asleep:
+            if self.ended and until is not None:
+                return False
+            with self.lock:
+                if self.held:
+                    if seconds is not None:
+                        until = self.now + max(1, int(seconds * 1e9))
+                    if until is not None and not parked.queued:
+                        if until <= self.now:
+                            self.ready(parked, False)
+                        self.serial += 1
+                        self.sleepers.append((until, self.serial, parked))
+                    if self.holder == _me():
+                        self.holder = None
+                    self.grant()
+                    asleep = True
+            if asleep:
+                parked.wake.acquire()
+            else:
+                since = _wall()
+                if parked.wake.acquire(True, _LOOK_S if seconds is None else min(_LOOK_S, max(seconds, 0.0))):
+                    return parked.woken
+                if seconds is not None:
+                    seconds -= _wall() - since
+                    if seconds <= 0.0:
+                        return False
+        if until is not None:
+            with self.lock:
+                self.sleepers = [entry for entry in self.sleepers if entry[2] is not parked]
+        return parked.woken
+
+    def wake(self, parked):
+        with self.lock:
+            self.ready(parked)
+            self.grant()
+
+    def enter(self):
+        """A thread takes part from now on."""
+        with self.lock:
+            if not self.held or self.holder == _me():
+                return
+            parked = _Parked()
+            self.ready(parked)
+            self.grant()
+        parked.wake.acquire()
+
+    def leave(self):
+        """A thread ends."""
+        with self.lock:
+            if self.holder == _me():
+                self.holder = None
+                self.grant()
+
+    def managed(self):
+        """Whether waiting of this thread is waiting for others of the process."""
+        return _me() not in self.exempt
+
+    def wait(self, wait_set, timeout_ns):
+        """An executor waits for work; it may return without any, and then builds a new set and comes again."""
+        me = _me()
+        if not self.held:
+            self.executors.add(me)
+            limit = int(_LOOK_S * 1e9)
+            wait_set.poll(limit if timeout_ns < 0 else min(limit, timeout_ns))
+            if self.held:
+                wait_set.clear_entities()
+            return
+        self.executors.add(me)
+        if self.holder != me or self.polled.get(me) == self.activity:
+            parked = _Parked()
+            with self.lock:
+                if not self.held:
+                    return
+                self.polls[me] = parked
+                if self.holder == me:
+                    self.holder = None
+                self.grant()
+            parked.wake.acquire()
+            if not self.held or wait_set.built != self.activity:
+                # Entities may have come and gone: the executor builds the set anew, with the baton.
+                wait_set.clear_entities()
+                return
+        wait_set.poll(0)
+        found = {kind: set(wait_set.ready_entities(kind)) for kind in _KINDS}
+        if timeout_ns > 0 and wait_set.timers:
+            found["timer"].discard(wait_set.timers[-1])
+            wait_set.limited = True
+        if any(it in self.awaited and it not in found["subscription"] for it in wait_set.subscriptions):
+            wait_set.clear_entities()
+            _sleep(0.00005)
+            return
+        self.awaited.difference_update(wait_set.subscriptions)
+        if any(found.values()):
+            self.activity += 1
+            self.deadlines.pop(me, None)
+            return
+        self.polled[me] = self.activity
+        if timeout_ns > 0 and self.now >= self.deadlines.setdefault(me, self.now + timeout_ns):
+            del self.deadlines[me]
+            self.activity += 1
+            wait_set.expired = True
+
+    # What can't be kept in step.
+
+    def fault(self, kind, words, frame):
+        """Notes something that can't be kept in step, once."""
+        if (kind, words) not in self.noted:
+            self.noted.add((kind, words))
+            self.faults.append({"kind": kind, "words": words, "place": _place(frame) if frame else ""})
+
+    def sent(self):
+        """Something is sent by the node's code."""
+        self.sends += 1
+        if self.held and self.holder != _me() and _me() not in self.exempt:
+            name = threading.current_thread().name
+            self.fault("own thread", f"thread {name} sends messages while its process waits for its turn", sys._getframe(2))
+
+    def where(self):
+        """The place at which the process computes or waits: of the thread with the baton, or of all."""
+        frames = sys._current_frames()
+        if self.holder in frames:
+            return _place(frames[self.holder])
+        return "; ".join(filter(None, (_place(frame) for ident, frame in frames.items() if ident not in self.exempt)))
+
+    def graph(self):
+        """Which topics the process publishes and the services that it calls, with the number of its matches."""
+        found = []
+        for node in sorted(self.nodes, key=lambda node: node._keeper_serial):
+            try:
+                for publisher in list(node.publishers):
+                    found.append(["publisher", publisher.topic_name, publisher.get_subscription_count()])
+                for client in list(node.clients):
+                    found.append(["client", client.service_name, int(client.service_is_ready())])
+                for waitable in list(node.waitables):
+                    if hasattr(waitable, "server_is_ready"):
+                        name = getattr(waitable, "_action_name", "")
+                        found.append(["action", name, int(waitable.server_is_ready())])
+            except Exception:  # A node that is being destroyed has nothing to match.
+                continue
+        return {"nodes": [node.get_fully_qualified_name() for node in self.nodes], "executors": len(self.executors), "ends": found}
+
+
+def _place(frame):
+    """The innermost line of the node's own code."""
+    while frame is not None:
+        file = frame.f_code.co_filename
+        if not file.startswith((_STANDARD, "<")) and "/rclpy/" not in file and os.path.dirname(file) != os.path.dirname(__file__):
+            return f"{os.path.basename(file)}, line {frame.f_lineno}, in {frame.f_code.co_name}"
+        frame = frame.f_back
+    return ""
+
+
+_publish = None
+
+
+def install(executors, address):
+    """Puts the keeper between rclpy and the node. `executors` is the module `rclpy.executors`."""
+    global _publish
+    from rclpy import clock, node, time_source, timer
+    from rclpy.clock_type import ClockType
+    from rclpy.impl.implementation_singleton import rclpy_implementation as native
+    from rclpy.parameter import Parameter
+    from rclpy.qos import QoSProfile, ReliabilityPolicy
+
+    keeper = Keeper(address)
+    serial = iter(range(1, 1 << 62))
+    _publish = native.Publisher.publish
+
+    class WaitSet(native.WaitSet):
+        def __init__(self, *counts):
+            super().__init__(*counts)
+            self.subscriptions, self.timers = [], []
+            self.limited = self.expired = False
+            self.built = keeper.activity
+
+        def add_subscription(self, handle):
+            self.subscriptions.append(handle.pointer)
+            return super().add_subscription(handle)
+
+        def add_timer(self, handle):
+            self.timers.append(handle.pointer)
+            return super().add_timer(handle)
+
+        def poll(self, timeout_ns):
+            super().wait(timeout_ns)
+
+        def ready_entities(self, kind):
+            return super().get_ready_entities(kind)
+
+        def wait(self, timeout_ns):
+            keeper.wait(self, timeout_ns)
+
+        def get_ready_entities(self, kind):
+            found = super().get_ready_entities(kind)
+            if kind == "timer" and self.limited:
+                found = [pointer for pointer in found if pointer != self.timers[-1]]
+                if self.expired:
+                    found.append(self.timers[-1])
+            return found
+
+    native.WaitSet = WaitSet
+
+    # Everything that a node sends is counted: after a turn in which nothing was sent, no other process has work.
+    def counted(function):
+        def call(*args, **kwargs):
+            keeper.sent()
+            return function(*args, **kwargs)
+
+        return call
+
+    for kind in ("Publisher", "Client", "Service", "ActionClient", "ActionServer"):
+        known = getattr(native, kind)
+        for name in dir(known):
+            if name.startswith(("send_", "publish", "service_send", "take_goal_request")) and not name.startswith("take"):
+                setattr(known, name, counted(getattr(known, name)))
+
+    # A multi-threaded executor.
+    made = executors.MultiThreadedExecutor.__init__
+
+    def make_executor(self, *args, **kwargs):
+        made(self, *args, **kwargs)
+        most = self._executor._max_workers
+        self._executor.shutdown(wait=False)
+        self._executor = _Pool(keeper, most)
+
+    executors.MultiThreadedExecutor.__init__ = make_executor
+
+    # Simulated time.
+    source_made = time_source.TimeSource.__init__
+
+    def make_source(self, *args, **kwargs):
+        self._keeper_serial = next(serial)
+        keeper.sources.add(self)
+        source_made(self, *args, **kwargs)
+
+    def told_time(self, message):
+        if not keeper.held:
+            hears(self, message)
+
+    hears = time_source.TimeSource.clock_callback
+    time_source.TimeSource.__init__, time_source.TimeSource.clock_callback = make_source, told_time
+    sleeps = clock.Clock.sleep_until
+
+    def sleep_until(self, until, context=None):
+        if not keeper.managed():
+            return sleeps(self, until, context)
+        if until.clock_type != self._clock_type:
+            raise ValueError("until's clock type does not match this clock's type")
+        if self._clock_type == ClockType.ROS_TIME and self.ros_time_is_active:
+            keeper.park(_Parked(), until=until.nanoseconds)
+        else:
+            keeper.park(_Parked(), seconds=max(0.0, (until - self.now()).nanoseconds / 1e9))
+        return self.now() >= until
+
+    clock.Clock.sleep_until = sleep_until
+
+    def sleep(seconds):
+        if keeper.managed():
+            if seconds < 0:
+                raise ValueError("sleep length must be non-negative")
+            keeper.park(_Parked(), seconds=seconds)
+        else:
+            _sleep(seconds)
+
+    time.sleep = sleep
+    timer_made = timer.Timer.__init__
+
+    def make_timer(self, callback, callback_group, timer_period_ns, clock, **kwargs):
+        timer_made(self, callback, callback_group, timer_period_ns, clock, **kwargs)
+        if callback is not None and clock.clock_type != ClockType.ROS_TIME:
+            words = f"a timer of {timer_period_ns / 1e9:g} s runs by the wall clock"
+            keeper.fault("wall clock", words, sys._getframe(1))
+
+    timer.Timer.__init__ = make_timer
+
+    # Nodes: simulated time and reliable messages.
+    node_made = node.Node.__init__
+
+    def make_node(self, *args, **kwargs):
+        given = list(kwargs.get("parameter_overrides") or [])
+        if not any(parameter.name == "use_sim_time" for parameter in given):
+            given.append(Parameter("use_sim_time", Parameter.Type.BOOL, True))
+        kwargs["parameter_overrides"] = given
+        node_made(self, *args, **kwargs)
+        from rosgraph_msgs.msg import Clock
+
+        self._keeper_serial = next(serial)
+        self._keeper_mark = self.create_publisher(Clock, MARK, 1000)
+        keeper.nodes.add(self)
+
+    node.Node.__init__ = make_node
+
+    def reliable(qos):
+        if isinstance(qos, QoSProfile) and qos.reliability in (ReliabilityPolicy.BEST_EFFORT, ReliabilityPolicy.SYSTEM_DEFAULT):
+            qos = copy.copy(qos)
+            qos.reliability = ReliabilityPolicy.RELIABLE
+        return qos
+
+    publishes, subscribes = node.Node.create_publisher, node.Node.create_subscription
+
+    def create_publisher(self, msg_type, topic, qos_profile, **kwargs):
+        return publishes(self, msg_type, topic, reliable(qos_profile), **kwargs)
+
+    def create_subscription(self, msg_type, topic, callback, qos_profile, **kwargs):
+        return subscribes(self, msg_type, topic, callback, reliable(qos_profile), **kwargs)
+
+    node.Node.create_publisher, node.Node.create_subscription = create_publisher, create_subscription
+    _install_threads(keeper)
+    events = getattr(native, "EventsExecutor", None)
+    if events is not None:
+
+        def make_events(*args, **kwargs):
+            keeper.fault("executor", "EventsExecutor does its work outside Python", sys._getframe(1))
+            return events(*args, **kwargs)
+
+        native.EventsExecutor = make_events
+
+
+def _install_threads(keeper):
+    """Threads of the node's own: what they wait for is waiting for others of the process."""
+    condition = threading.Condition
+    notifies, waits = condition.notify, condition.wait
+
+    def wait(self, timeout=None):
+        if not keeper.managed():
+            return waits(self, timeout)
+        if not self._is_owned():
+            raise RuntimeError("cannot wait on un-acquired lock")
+        parked = _Parked()
+        line = self.__dict__.setdefault("_keeper_line", deque())
+        line.append(parked)
+        saved = self._release_save()
+        try:
+            return keeper.park(parked, seconds=timeout)
+        finally:
+            self._acquire_restore(saved)
+            if parked in line:
+                line.remove(parked)
+
+    def notify(self, n=1):
+        if not self._is_owned():
+            raise RuntimeError("cannot notify on un-acquired lock")
+        line = self.__dict__.get("_keeper_line", ())
+        left = n
+        while line and left > 0:
+            keeper.wake(line.popleft())
+            left -= 1
+        if left > 0:
+            notifies(self, left)
+
+    def notify_all(self):
+        self.notify(len(self._waiters) + len(self.__dict__.get("_keeper_line", ())))
+
+    condition.wait, condition.notify, condition.notify_all = wait, notify, notify_all
+    condition.notifyAll = notify_all
+
+    class Lock:
+        """A lock of the node's own code: who waits for it gives the baton away."""
+
+        def __init__(self):
+            self._raw, self._line = _Lock(), deque()
+
+        def acquire(self, blocking=True, timeout=-1):
+            if self._raw.acquire(False):
+                return True
+            if not blocking:
+                return False
+            if not keeper.managed():
+                return self._raw.acquire(True, timeout)
+            while True:
+                parked = _Parked()
+                self._line.append(parked)
+                if self._raw.acquire(False):
+                    self._line.remove(parked)
+                    return True
+                woken = keeper.park(parked, seconds=None if timeout < 0 else timeout)
+                if self._raw.acquire(False):
+                    return True
+                if not woken and timeout >= 0:
+                    return False
+
+        def release(self):
+            self._raw.release()
+            if self._line:
+                keeper.wake(self._line.popleft())
+
+        def locked(self):
+            return self._raw.locked()
+
+        def __enter__(self):
+            return self.acquire()
+
+        def __exit__(self, *_):
+            self.release()
+
+        def _at_fork_reinit(self):
+            self._raw._at_fork_reinit()
+
+    python_rlock, native_rlock = threading._PyRLock, threading.RLock
+
+    class RLock(python_rlock):
+        def __init__(self):
+            super().__init__()
+            self._block = Lock()
+
+    def own_code():
+        file = sys._getframe(2).f_code.co_filename
+        return not file.startswith((_STANDARD, "<")) and "/rclpy/" not in file
+
+    threading.Lock = lambda: Lock() if own_code() else _Lock()
+    threading.RLock = lambda: RLock() if own_code() else native_rlock()
+
+    # Threads that are started in a turn take part; those of pools do their work beside the baton, and are waited for.
+    thread = threading.Thread
+    runs, joins = thread._bootstrap_inner, thread.join
+
+    def bootstrap(self):
+        takes_part = keeper.held and self._target is not concurrent.futures.thread._worker
+        if takes_part:
+            run = self.run
+
+            def entered():
+                keeper.enter()
+                run()
+
+            self.run = entered
+        try:
+            runs(self)
+        finally:
+            for parked in self.__dict__.pop("_keeper_joins", ()):
+                keeper.wake(parked)
+            keeper.leave()
+
+    def join(self, timeout=None):
+        if keeper.held and keeper.managed() and self.is_alive() and self is not threading.current_thread():
+            parked = _Parked()
+            line = self.__dict__.setdefault("_keeper_joins", deque())
+            line.append(parked)
+            if self.is_alive():
+                keeper.park(parked, seconds=timeout)
+                if not parked.woken:
+                    return
+        joins(self, timeout)
+
+    thread._bootstrap_inner, thread.join = bootstrap, join
+    pool = concurrent.futures.ThreadPoolExecutor
+    submits = pool.submit
+
+    def submit(self, fn, /, *args, **kwargs):
+        with keeper.lock:
+            keeper.foreign += 1
+        future = submits(self, fn, *args, **kwargs)
+
+        # Called after those that wait for the result were woken.
+        def done(_):
+            with keeper.lock:
+                keeper.foreign -= 1
+                keeper.grant()
+
+        future.add_done_callback(done)
+        return future
+
+    pool.submit = submit
+    threading._register_atexit(keeper.leave)

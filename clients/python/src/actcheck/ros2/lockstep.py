@@ -1,0 +1,205 @@
+"""The simulation's side of lockstep: gives the nodes' processes their turns, and waits until all are idle."""
+
+from __future__ import annotations
+
+import json
+import select
+import socket
+import struct
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rclpy.executors import Executor, TimeoutException
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+
+from actcheck.ros2.faults import BrokenNode
+
+_LENGTH = struct.Struct("<I")
+#: Topic on which a process says that all messages of its turn were sent; the same as in `inside/keeper.py`.
+MARK = "/actcheck/mark"
+#: Most rounds of messages at one moment: more are a flood, of nodes that answer each other without end.
+MOST_ROUNDS = 200
+
+
+@dataclass(eq=False)
+class Kept:
+    """A process with a keeper."""
+
+    connection: socket.socket
+    pid: int
+    #: Name of its program, for people.
+    program: str
+    #: Last mark that came by a message.
+    marked: int = 0
+    buffer: bytearray = field(default_factory=bytearray)
+
+
+class Lockstep:
+    """Turns of all processes that have a keeper. Times are simulated, in nanoseconds."""
+
+    def __init__(self, node: Node, executor: Executor, limit_s: float, alive: Callable[[], None]) -> None:
+        self._node, self._executor = node, executor
+        self._limit_s = limit_s
+        #: Raises `BrokenNode` if a process has ended.
+        self._alive = alive
+        self._folder = tempfile.TemporaryDirectory(prefix="actcheck-ros2-")
+        self.address = str(Path(self._folder.name) / "keeper")
+        self._server = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._server.bind(self.address)
+        self._server.listen(64)
+        self.kept: list[Kept] = []
+        self._turn, self._now = 0, 0
+        self._handled = 0
+        qos = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
+        self._clock = node.create_publisher(Clock, "/clock", qos)
+        node.create_subscription(Clock, MARK, self._marked, qos)
+
+    def accept(self) -> None:
+        """Takes processes that have called, without waiting."""
+        while select.select([self._server], [], [], 0)[0]:
+            connection, _ = self._server.accept()
+            kept = Kept(connection, 0, "")
+            hello = self._receive(kept, 5.0)
+            kept.pid, kept.program = int(hello["hello"]), str(hello["command"]) or "python"
+            self.kept.append(kept)
+
+    def hold(self, now: int) -> None:
+        """From now on, processes act only in their turns."""
+        self._now = now
+        # The order of turns must not depend on the order in which processes started.
+        self.kept.sort(key=lambda kept: kept.pid)
+        for kept in self.kept:
+            self._send(kept, {"hold": now})
+            if self._receive(kept)["held"] == 0:
+                raise BrokenNode(f"{kept.program} has an rclpy node that never spins, and so never hears of the time")
+
+    def free(self) -> None:
+        """Lets all processes act on their own, so that they can end."""
+        for kept in self.kept:
+            try:
+                self._send(kept, {"free": True})
+            except BrokenNode:
+                continue
+
+    def close(self) -> None:
+        """Closes all connections."""
+        for kept in self.kept:
+            kept.connection.close()
+        self._server.close()
+        self._folder.cleanup()
+
+    def graphs(self) -> list[dict[str, Any]]:
+        """What the nodes of every process publish and call, with the number of their matches."""
+        found = []
+        for kept in self.kept:
+            self._send(kept, {"graph": True})
+            found.append(self._receive(kept)["graph"])
+        return found
+
+    def barrier(self, now: int) -> None:
+        """Gives all processes turns at a moment until none has anything to do. Raises `BrokenNode`."""
+        self._now = now
+        self.drain()
+        for _ in range(MOST_ROUNDS):
+            self._turn += 1
+            self._clock.publish(clock(now))
+            busy = False
+            self.accept()
+            for kept in self.kept:
+                self._send(kept, {"turn": self._turn, "now": now})
+                reply = self._receive(kept)
+                for fault in reply["faults"]:
+                    place = f" ({fault['place']})" if fault["place"] else ""
+                    raise BrokenNode(f"{kept.program} can't be kept in step: {fault['words']}{place}")
+                if reply["sends"]:
+                    busy = True
+                    self._until_marked(kept)
+            before = self._handled
+            self.drain()
+            if not busy and self._handled == before:
+                return
+        raise BrokenNode(f"the nodes sent messages in {MOST_ROUNDS} rounds while no time passed: a loop of messages without a rate")
+
+    def drain(self) -> None:
+        """Performs all callbacks of the simulation's own node that are ready."""
+        while self._spin(0.0):
+            pass
+
+    def _spin(self, seconds: float) -> bool:
+        try:
+            handler, entity, _ = self._executor.wait_for_ready_callbacks(timeout_sec=seconds)
+        except TimeoutException:
+            return False
+        handler()
+        error = handler.exception()
+        if error is not None:
+            raise error
+        if getattr(entity, "topic_name", "") != MARK:
+            self._handled += 1
+        return True
+
+    def _marked(self, message: Clock) -> None:
+        for kept in self.kept:
+            if kept.pid == message.clock.nanosec:
+                kept.marked = max(kept.marked, message.clock.sec)
+
+    def _until_marked(self, kept: Kept) -> None:
+        since = time.monotonic()
+        while kept.marked < self._turn:
+            self._spin(0.05)
+            if time.monotonic() - since > self._limit_s:
+                raise BrokenNode(f"messages of {kept.program} do not arrive: was the network stopped?")
+
+    def _send(self, kept: Kept, message: dict[str, Any]) -> None:
+        payload = json.dumps(message).encode()
+        try:
+            kept.connection.sendall(_LENGTH.pack(len(payload)) + payload)
+        except OSError:
+            self._alive()
+            raise BrokenNode(f"{kept.program} ended") from None
+
+    def _receive(self, kept: Kept, limit_s: float | None = None) -> dict[str, Any]:
+        since, asked = time.monotonic(), False
+        limit = limit_s or self._limit_s
+        while True:
+            if len(kept.buffer) >= _LENGTH.size:
+                length = _LENGTH.unpack(kept.buffer[: _LENGTH.size])[0]
+                if len(kept.buffer) >= _LENGTH.size + length:
+                    payload = bytes(kept.buffer[_LENGTH.size : _LENGTH.size + length])
+                    del kept.buffer[: _LENGTH.size + length]
+                    message: dict[str, Any] = json.loads(payload)
+                    if asked and "where" in message:
+                        place = message["where"] or "an unknown place"
+                        raise BrokenNode(f"{kept.program} was busy for more than {limit:g} s while no time passed: at {place}")
+                    return message
+            ready, _, _ = select.select([kept.connection], [], [], 0.25)
+            if ready:
+                try:
+                    piece = kept.connection.recv(65536)
+                except OSError:
+                    piece = b""
+                if not piece:
+                    time.sleep(0.05)
+                    self._alive()
+                    raise BrokenNode(f"{kept.program} ended")
+                kept.buffer += piece
+                continue
+            late = time.monotonic() - since
+            if late > limit + 3.0:
+                raise BrokenNode(f"{kept.program} does not answer: all of its threads are stopped")
+            if late > limit and not asked:
+                asked = True
+                self._send(kept, {"where": True})
+
+
+def clock(now: int) -> Clock:
+    """The message of a time in nanoseconds."""
+    message = Clock()
+    message.clock.sec, message.clock.nanosec = divmod(now, 1_000_000_000)
+    return message
