@@ -37,6 +37,8 @@ _STANDARD = os.path.dirname(os.__file__)
 _KINDS = ("subscription", "timer", "client", "service", "guard_condition")
 #: How often a free process looks whether it is held. Unit: seconds.
 _LOOK_S = 0.02
+#: How long a process has to end after the simulation. Unit: seconds.
+_GRACE_S = 5.0
 #: Topic on which a process says that all of its messages were sent.
 MARK = "/actcheck/mark"
 
@@ -54,11 +56,26 @@ class _Parked:
         self.pool, self.work = pool, work
 
 
+def _position(task):
+    """Where a coroutine stands that was begun; `None` if the task is another function, not begun, or done."""
+    coroutine = getattr(task, "_handler", None)
+    if getattr(coroutine, "cr_await", None) is None:
+        return None
+    found = []
+    while coroutine is not None:
+        frame = getattr(coroutine, "cr_frame", None) or getattr(coroutine, "gi_frame", None)
+        found.append((id(coroutine), frame and frame.f_lasti))
+        coroutine = getattr(coroutine, "cr_await", None)
+    return found
+
+
 class _Pool:
     """Stands in for the thread pool of a multi-threaded executor: its threads take turns."""
 
     def __init__(self, keeper, most):
         self.keeper, self.most, self.active = keeper, most, 0
+        #: Threads without work: each waits for its lock, and finds the work beside it.
+        self.idle = []
 
     def submit(self, work):
         """Queues work; it begins when a thread of the pool is free and the baton comes round."""
@@ -69,20 +86,36 @@ class _Pool:
     def start(self, parked):
         """Begins queued work. Called with the keeper's lock."""
         self.active += 1
-        _thread.start_new_thread(self.perform, (parked.work,))
+        if self.idle:
+            place = self.idle.pop()
+            place[1] = parked.work
+            place[0].release()
+        else:
+            lock = _Lock()
+            lock.acquire()
+            _thread.start_new_thread(self.perform, ([lock, parked.work],))
 
-    def perform(self, work):
+    def perform(self, place):
+        """A thread of the pool."""
         keeper = self.keeper
-        if keeper.held:
-            keeper.holder = _me()
-        try:
-            work()
-        finally:
-            with keeper.lock:
-                self.active -= 1
-                if keeper.holder == _me():
-                    keeper.holder = None
-                keeper.grant()
+        while True:
+            if keeper.holder == -1:
+                keeper.holder = _me()
+            before = _position(place[1])
+            try:
+                place[1]()
+            finally:
+                with keeper.lock:
+                    # Executors try tasks again that await something; a try that changes nothing is no activity.
+                    if before is None or _position(place[1]) != before:
+                        keeper.activity += 1
+                    self.active -= 1
+                    place[1] = None
+                    self.idle.append(place)
+                    if keeper.holder == _me():
+                        keeper.holder = None
+                    keeper.grant()
+            place[0].acquire()
 
     def shutdown(self, wait=True, **_):
         """Waits for the threads, for a while: they may sleep."""
@@ -106,6 +139,8 @@ class Keeper:
         #: Executors that wait for something to do, and the activity at which each found nothing.
         self.polls, self.polled, self.deadlines = {}, {}, {}
         self.activity = 0
+        #: How often a timer of rcl's own was ready at a moment.
+        self.tries = {}
         self.sleepers, self.serial = [], 0
         self.now = 0
         self.sends = self.foreign = self.marker = 0
@@ -158,7 +193,10 @@ class Keeper:
                 elif "where" in message:
                     self.send({"where": self.where()})
         except (EOFError, OSError):
+            # The simulation is gone; so that nothing stays behind, the process goes, too.
             self.free()
+            _sleep(_GRACE_S)
+            os._exit(1)
 
     def hold(self, now):
         with self.lock:
@@ -235,7 +273,8 @@ class Keeper:
         for place, parked in enumerate(self.queue):
             if parked.work is None or parked.pool.active < parked.pool.most:
                 del self.queue[place]
-                self.activity += 1
+                if parked.work is None:
+                    self.activity += 1
                 self.holder = parked.ident or -1
                 self.begin(parked)
                 return
@@ -375,6 +414,10 @@ class Keeper:
             _sleep(0.00005)
             return
         self.awaited.difference_update(wait_set.subscriptions)
+        # Timers of rcl's own that do nothing, see `_patient`.
+        found["timer"].difference_update(
+            pointer for pointer in found["timer"].difference(wait_set.timers) if self.tried("timer", pointer)
+        )
         if any(found.values()):
             self.activity += 1
             self.deadlines.pop(me, None)
@@ -384,6 +427,12 @@ class Keeper:
             del self.deadlines[me]
             self.activity += 1
             wait_set.expired = True
+
+    def tried(self, kind, which):
+        """Whether something was ready more than twice at this moment."""
+        moment, tries = self.tries.get((kind, which), (0, 0))
+        self.tries[kind, which] = (self.now, tries + 1 if moment == self.now else 1)
+        return self.tries[kind, which][1] > 2
 
     # What can't be kept in step.
 
@@ -560,12 +609,14 @@ def install(executors, address):
 
     # Nodes: simulated time and reliable messages.
     node_made = node.Node.__init__
+    patient = _patient(keeper)
 
     def make_node(self, *args, **kwargs):
         given = list(kwargs.get("parameter_overrides") or [])
         if not any(parameter.name == "use_sim_time" for parameter in given):
             given.append(Parameter("use_sim_time", Parameter.Type.BOOL, True))
         kwargs["parameter_overrides"] = given
+        patient()
         node_made(self, *args, **kwargs)
         from rosgraph_msgs.msg import Clock
 
@@ -599,6 +650,34 @@ def install(executors, address):
             return events(*args, **kwargs)
 
         native.EventsExecutor = make_events
+
+
+def _patient(keeper):
+    """Returns a function that makes action servers wait until old results are older than their time.
+
+    The timer for it stays ready at the very moment of that time, since a result is older only afterwards: without a passing
+    time, it would be ready for ever.
+    """
+    done = []
+
+    def make():
+        if done:
+            return
+        done.append(True)
+        from rclpy.action import server
+
+        ready = server.ActionServer.is_ready
+
+        def is_ready(self, wait_set):
+            answer = ready(self, wait_set)
+            if keeper.held and self._is_goal_expired and keeper.tried("server", id(self)):
+                self._is_goal_expired = False
+                answer = self._is_goal_request_ready or self._is_cancel_request_ready or self._is_result_request_ready
+            return answer
+
+        server.ActionServer.is_ready = is_ready
+
+    return make
 
 
 def _install_threads(keeper):
