@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import TracebackType
 from typing import Any
 
@@ -13,8 +14,10 @@ from actcheck.wire import Message, Wire
 class Session:
     """A connection to one simulation after the exchange of hello messages."""
 
-    def __init__(self, wire: Wire, name: str, actions: list[str]) -> None:
+    def __init__(self, wire: Wire, name: str, actions: list[str], on_reset: Callable[[], None] = lambda: None) -> None:
         self._wire = wire
+        #: Called before a new scene, and after the last action of a run.
+        self._on_reset = on_reset
         hello = self._receive("hello")
         if hello.get("protocol") != PROTOCOL:
             wire.close()
@@ -39,6 +42,7 @@ class Session:
             if message["type"] == "bye":
                 return None
             if message["type"] == "reset":
+                self._on_reset()
                 self._run, self._seed = str(message["run"]), int(message["seed"])
                 self._index = int(message.get("index", 0))
                 self._wire.send({"type": "ready"})

@@ -55,7 +55,7 @@ def _site(folder: Path) -> Path:
 def stamp() -> str:
     """Digest over the pins, the interfaces and the Python version: an environment of another digest is made anew."""
     digest = hashlib.sha256(sys.version.encode())
-    for file in [HERE / "pins.txt", HERE / "environment.py", *sorted((HERE / "interfaces").rglob("*.*"))]:
+    for file in [HERE / "pins.txt", *sorted((HERE / "interfaces").rglob("*.*"))]:
         digest.update(file.name.encode() + file.read_bytes())
     return digest.hexdigest()
 
@@ -64,6 +64,11 @@ def is_made(folder: Path) -> bool:
     """Whether a folder holds a complete environment of these pins and interfaces."""
     file = folder / STAMP
     return file.is_file() and file.read_text() == stamp()
+
+
+def is_stale(folder: Path) -> bool:
+    """Whether a folder holds an environment of other pins or interfaces."""
+    return (folder / STAMP).is_file() and not is_made(folder)
 
 
 def make(folder: Path) -> None:

@@ -35,6 +35,8 @@ class Kept:
     pid: int
     #: Name of its program, for people.
     program: str
+    #: Number of the command that started it, and its arguments: processes take turns in this order.
+    order: tuple[int, str, int] = (0, "", 0)
     #: Last mark that came by a message.
     marked: int = 0
     buffer: bytearray = field(default_factory=bytearray)
@@ -66,14 +68,16 @@ class Lockstep:
             connection, _ = self._server.accept()
             kept = Kept(connection, 0, "")
             hello = self._receive(kept, 5.0)
-            kept.pid, kept.program = int(hello["hello"]), str(hello["command"]) or "python"
+            words = [str(word) for word in hello["command"]]
+            kept.pid, kept.program = int(hello["hello"]), Path(words[0]).name if words else "python"
+            kept.order = (int(hello["number"]), " ".join(words), kept.pid)
             self.kept.append(kept)
 
     def hold(self, now: int) -> None:
         """From now on, processes act only in their turns."""
         self._now = now
-        # The order of turns must not depend on the order in which processes started.
-        self.kept.sort(key=lambda kept: kept.pid)
+        # The order of turns must not depend on who was faster at the start.
+        self.kept.sort(key=lambda kept: kept.order)
         for kept in self.kept:
             self._send(kept, {"hold": now})
             if self._receive(kept)["held"] == 0:
@@ -86,6 +90,11 @@ class Lockstep:
                 self._send(kept, {"free": True})
             except BrokenNode:
                 continue
+
+    @property
+    def nodes(self) -> int:
+        """Number of processes with a keeper."""
+        return len(self.kept)
 
     def close(self) -> None:
         """Closes all connections."""
@@ -196,6 +205,63 @@ class Lockstep:
             if late > limit and not asked:
                 asked = True
                 self._send(kept, {"where": True})
+
+
+class FreeRunning:
+    """The contrast to lockstep: the clock runs with the wall's, whether the nodes keep up or not."""
+
+    def __init__(self, node: Node, executor: Executor, alive: Callable[[], None]) -> None:
+        self._executor, self._alive = executor, alive
+        self._clock = node.create_publisher(Clock, "/clock", 10)
+        self._started: tuple[float, int] | None = None
+        self.address, self.nodes = "", 0
+
+    def accept(self) -> None:
+        """Nobody calls."""
+
+    def hold(self, now: int) -> None:
+        """The clock starts to run."""
+        self._started = (time.monotonic(), now)
+
+    def free(self) -> None:
+        """Nobody is held."""
+
+    def close(self) -> None:
+        """Nothing is open."""
+
+    def graphs(self) -> list[dict[str, Any]]:
+        """Nothing is known of the nodes."""
+        return []
+
+    def barrier(self, now: int) -> None:
+        """Publishes the time, and performs callbacks until the wall's clock has come to it."""
+        self._clock.publish(clock(now))
+        self._alive()
+        if self._started is None:
+            self.drain()
+            return
+        since, begun = self._started
+        while True:
+            left = (now - begun) / 1e9 - (time.monotonic() - since)
+            self._spin(max(0.0, min(left, 0.01)))
+            if left <= 0.0:
+                return
+
+    def drain(self) -> None:
+        """Performs all callbacks that are ready."""
+        while self._spin(0.0):
+            pass
+
+    def _spin(self, seconds: float) -> bool:
+        try:
+            handler, _, _ = self._executor.wait_for_ready_callbacks(timeout_sec=seconds)
+        except TimeoutException:
+            return False
+        handler()
+        error = handler.exception()
+        if error is not None:
+            raise error
+        return True
 
 
 def clock(now: int) -> Clock:

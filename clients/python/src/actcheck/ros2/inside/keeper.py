@@ -154,7 +154,8 @@ class Keeper:
         self.connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self.connection.connect(address)
         self.writing = _Lock()
-        self.send({"hello": os.getpid(), "command": os.path.basename(sys.argv[0] if sys.argv else "")})
+        number = int(os.environ.get("ACTCHECK_ROS_NUMBER", "0"))
+        self.send({"hello": os.getpid(), "number": number, "command": sys.argv})
         _thread.start_new_thread(self.serve, ())
 
     # The connection to the simulation.
