@@ -27,8 +27,9 @@ from actcheck.wire import Wire
 
 #: Simulated time at which a run begins; 0 means "no time yet" to ROS 2. Unit: nanoseconds.
 BEGINNING = 1_000_000_000
-#: Name of the bridge's own node.
+#: Names of the bridge's own nodes.
 NAME = "actcheck"
+OWN = (NAME, f"{NAME}_marks")
 #: Nodes of tools, which take no part.
 TOOLS = ("_ros2cli", "launch_ros")
 #: Time for the answers to a new participant, so that none that belongs to the graph is missed. Unit: seconds.
@@ -193,7 +194,7 @@ class RunOfNodes:
         """Names of the action servers of each other node."""
         found = []
         for name, space in self._node.get_node_names_and_namespaces():
-            if name == NAME:
+            if name in OWN:
                 continue
             try:
                 servers = get_action_server_names_and_types_by_node(self._node, name, space)
@@ -215,7 +216,7 @@ class RunOfNodes:
         kept = {name for graph in self._step.graphs() for name in graph["nodes"]}
         for name, space in self._node.get_node_names_and_namespaces():
             full = f"{space.rstrip('/')}/{name}"
-            if name != NAME and not name.startswith(TOOLS) and full not in kept:
+            if name not in OWN and not name.startswith(TOOLS) and full not in kept:
                 raise BrokenNode(
                     f"the node {full} can't be kept in step: it is not of rclpy, or was started without the environment of "
                     "its launcher; --free-running tests it without a promise that runs repeat"

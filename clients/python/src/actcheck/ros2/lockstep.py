@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rclpy.executors import Executor, TimeoutException
+from rclpy.executors import Executor, SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
@@ -60,7 +60,12 @@ class Lockstep:
         self._handled = 0
         qos = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
         self._clock = node.create_publisher(Clock, "/clock", qos)
-        node.create_subscription(Clock, MARK, self._marked, qos)
+        # A node of its own: while the simulation waits for a mark, nothing else is taken, so that the order of its callbacks
+        # does not depend on what came first.
+        self._marks = Node(f"{node.get_name()}_marks", context=node.context, start_parameter_services=False, enable_rosout=False)
+        self._marks.create_subscription(Clock, MARK, self._marked, qos)
+        self._marker = SingleThreadedExecutor(context=node.context)
+        self._marker.add_node(self._marks)
 
     def accept(self) -> None:
         """Takes processes that have called, without waiting."""
@@ -102,6 +107,8 @@ class Lockstep:
             kept.connection.close()
         self._server.close()
         self._folder.cleanup()
+        self._marker.shutdown()
+        self._marks.destroy_node()
 
     def graphs(self) -> list[dict[str, Any]]:
         """What the nodes of every process publish and call, with the number of their matches."""
@@ -137,21 +144,8 @@ class Lockstep:
 
     def drain(self) -> None:
         """Performs all callbacks of the simulation's own node that are ready."""
-        while self._spin(0.0):
-            pass
-
-    def _spin(self, seconds: float) -> bool:
-        try:
-            handler, entity, _ = self._executor.wait_for_ready_callbacks(timeout_sec=seconds)
-        except TimeoutException:
-            return False
-        handler()
-        error = handler.exception()
-        if error is not None:
-            raise error
-        if getattr(entity, "topic_name", "") != MARK:
+        while performed(self._executor, 0.0):
             self._handled += 1
-        return True
 
     def _marked(self, message: Clock) -> None:
         for kept in self.kept:
@@ -161,7 +155,7 @@ class Lockstep:
     def _until_marked(self, kept: Kept) -> None:
         since = time.monotonic()
         while kept.marked < self._turn:
-            self._spin(0.05)
+            performed(self._marker, 0.05)
             if time.monotonic() - since > self._limit_s:
                 raise BrokenNode(f"messages of {kept.program} do not arrive: was the network stopped?")
 
@@ -243,25 +237,27 @@ class FreeRunning:
         since, begun = self._started
         while True:
             left = (now - begun) / 1e9 - (time.monotonic() - since)
-            self._spin(max(0.0, min(left, 0.01)))
+            performed(self._executor, max(0.0, min(left, 0.01)))
             if left <= 0.0:
                 return
 
     def drain(self) -> None:
         """Performs all callbacks that are ready."""
-        while self._spin(0.0):
+        while performed(self._executor, 0.0):
             pass
 
-    def _spin(self, seconds: float) -> bool:
-        try:
-            handler, _, _ = self._executor.wait_for_ready_callbacks(timeout_sec=seconds)
-        except TimeoutException:
-            return False
-        handler()
-        error = handler.exception()
-        if error is not None:
-            raise error
-        return True
+
+def performed(executor: Executor, seconds: float) -> bool:
+    """Performs one callback that is ready within some seconds. Returns whether there was one."""
+    try:
+        handler, _, _ = executor.wait_for_ready_callbacks(timeout_sec=seconds)
+    except TimeoutException:
+        return False
+    handler()
+    error = handler.exception()
+    if error is not None:
+        raise error
+    return True
 
 
 def clock(now: int) -> Clock:
