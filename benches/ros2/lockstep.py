@@ -119,8 +119,8 @@ def main():
             results["none"] += 1
         else:
             results[result.result().result.error_string] += 1
-        # To the next whole 3 s, a multiple of the timers' periods; the joint is at rest at its start.
-        rest = -now % 3_000_000_000 // TICK_NS
+        # To the next multiple of 0.6 s, one of the timers' periods; the joint is at rest at its start.
+        rest = -now % 600_000_000 // TICK_NS
         for _ in range(rest if not free else 10):
             states.publish(JointState(name=["j"], position=[0.0]))
             if not free:

@@ -18,7 +18,7 @@ from actcheck.faults import Aborted, ProtocolFault
 from actcheck.messages import Call, DepthImage, Observation, Report, things_from_wire
 from actcheck.ros2.faults import BrokenNode
 from actcheck.ros2.goal import Values, action_type, report
-from actcheck.ros2.lockstep import FreeRunning, Lockstep
+from actcheck.ros2.lockstep import MARK, FreeRunning, Lockstep
 from actcheck.ros2.mapping import SkillMapping
 from actcheck.ros2.nodes import Domain, Nodes
 from actcheck.ros2.robot import RosRobot, time_of
@@ -31,7 +31,7 @@ BEGINNING = 1_000_000_000
 NAME = "actcheck"
 OWN = (NAME, f"{NAME}_marks")
 #: Nodes of tools, which take no part.
-TOOLS = ("_ros2cli", "launch_ros")
+TOOLS = ("_ros2cli", "launch_ros", "_actcheck_keeper")
 #: Time for the answers to a new participant, so that none that belongs to the graph is missed. Unit: seconds.
 SETTLE_S = 0.2
 
@@ -186,6 +186,8 @@ class RunOfNodes:
             for kind, name, matches in graph["ends"]:
                 if kind == "publisher" and self._node.count_subscribers(name) > matches:
                     return f"a subscriber of {name} has not been found by its publisher"
+                if kind == "client" and name == MARK:
+                    return "a process has no node yet"
                 if kind == "client" and not matches and self._node.count_services(name):
                     return f"the service {name} has not been found by its client"
         return ""

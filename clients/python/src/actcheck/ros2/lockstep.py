@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from builtin_interfaces.msg import Time
 from rclpy.executors import Executor, SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
@@ -21,8 +22,9 @@ from rosgraph_msgs.msg import Clock
 from actcheck.ros2.faults import BrokenNode
 
 _LENGTH = struct.Struct("<I")
-#: Topic on which a process says that all messages of its turn were sent; the same as in `inside/keeper.py`.
-MARK = "/actcheck/mark"
+#: Topics with which both sides know that all earlier messages have arrived, as in `inside/keeper.py`: a message is received after
+#: all that were sent before it, by whomever, since they come through the same socket.
+MARK, TURN = "/actcheck/mark", "/actcheck/turn_"
 #: Most rounds of messages at one moment: more are a flood, of nodes that answer each other without end.
 MOST_ROUNDS = 200
 
@@ -37,8 +39,12 @@ class Kept:
     program: str
     #: Number of the command that started it, and its arguments: processes take turns in this order.
     order: tuple[int, str, int] = (0, "", 0)
+    #: Publisher of its markers.
+    turns: Any = None
     #: Last mark that came by a message.
     marked: int = 0
+    #: Whether something was sent to it, perhaps, since its last turn began.
+    due: bool = True
     buffer: bytearray = field(default_factory=bytearray)
 
 
@@ -58,7 +64,7 @@ class Lockstep:
         self.kept: list[Kept] = []
         self._turn, self._now = 0, 0
         self._handled = 0
-        qos = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
+        self._qos = qos = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
         self._clock = node.create_publisher(Clock, "/clock", qos)
         # A node of its own: while the simulation waits for a mark, nothing else is taken, so that the order of its callbacks
         # does not depend on what came first.
@@ -76,6 +82,7 @@ class Lockstep:
             words = [str(word) for word in hello["command"]]
             kept.pid, kept.program = int(hello["hello"]), Path(words[0]).name if words else "python"
             kept.order = (int(hello["number"]), " ".join(words), kept.pid)
+            kept.turns = self._marks.create_publisher(Clock, f"{TURN}{kept.pid}", self._qos)
             self.kept.append(kept)
 
     def hold(self, now: int) -> None:
@@ -114,33 +121,48 @@ class Lockstep:
         """What the nodes of every process publish and call, with the number of their matches."""
         found = []
         for kept in self.kept:
+            if kept.turns.get_subscription_count() == 0:
+                found.append({"nodes": [], "executors": 1, "ends": [["client", MARK, 0]]})
+                continue
             self._send(kept, {"graph": True})
             found.append(self._receive(kept)["graph"])
         return found
 
     def barrier(self, now: int) -> None:
         """Gives all processes turns at a moment until none has anything to do. Raises `BrokenNode`."""
+        if now != self._now:
+            self._clock.publish(clock(now))
         self._now = now
         self.drain()
+        for kept in self.kept:
+            kept.due = True
         for _ in range(MOST_ROUNDS):
-            self._turn += 1
-            self._clock.publish(clock(now))
-            busy = False
             self.accept()
             for kept in self.kept:
-                self._send(kept, {"turn": self._turn, "now": now})
-                reply = self._receive(kept)
-                for fault in reply["faults"]:
-                    place = f" ({fault['place']})" if fault["place"] else ""
-                    raise BrokenNode(f"{kept.program} can't be kept in step: {fault['words']}{place}")
-                if reply["sends"]:
-                    busy = True
-                    self._until_marked(kept)
-            before = self._handled
-            self.drain()
-            if not busy and self._handled == before:
+                if kept.due:
+                    self._give_turn(kept)
+            if not any(kept.due for kept in self.kept):
                 return
         raise BrokenNode(f"the nodes sent messages in {MOST_ROUNDS} rounds while no time passed: a loop of messages without a rate")
+
+    def _give_turn(self, kept: Kept) -> None:
+        """Gives a process its turn. Others are due again if it, or the simulation in answer to it, sent something."""
+        self._turn += 1
+        kept.due = False
+        kept.turns.publish(Clock(clock=Time(sec=self._turn)))
+        self._send(kept, {"turn": self._turn, "now": self._now})
+        reply = self._receive(kept)
+        for fault in reply["faults"]:
+            place = f" ({fault['place']})" if fault["place"] else ""
+            raise BrokenNode(f"{kept.program} can't be kept in step: {fault['words']}{place}")
+        if not reply["sends"]:
+            return
+        self._until_marked(kept)
+        before = self._handled
+        self.drain()
+        for other in self.kept:
+            # What a process sends to itself arrives within its turn.
+            other.due = other.due or other is not kept or self._handled != before
 
     def drain(self) -> None:
         """Performs all callbacks of the simulation's own node that are ready."""

@@ -39,8 +39,8 @@ _KINDS = ("subscription", "timer", "client", "service", "guard_condition")
 _LOOK_S = 0.02
 #: How long a process has to end after the simulation. Unit: seconds.
 _GRACE_S = 5.0
-#: Topic on which a process says that all of its messages were sent.
-MARK = "/actcheck/mark"
+#: Topics with which both sides know that all earlier messages have arrived: of a process, and to it.
+MARK, TURN = "/actcheck/mark", "/actcheck/turn_"
 
 
 class _Parked:
@@ -146,8 +146,8 @@ class Keeper:
         self.sends = self.foreign = self.marker = 0
         self.faults, self.noted = [], set()
         self.sources, self.nodes = weakref.WeakSet(), weakref.WeakSet()
-        #: Clock subscriptions whose marker has not come in this turn.
-        self.awaited = set()
+        #: A hidden node of the keeper's, and its ends of the topics `MARK` and `TURN`.
+        self.own, self.marks, self.turns = None, None, None
         #: Executors that have been in `wait`.
         self.executors = set()
         self.exempt = set()
@@ -221,12 +221,9 @@ class Keeper:
 
     def turn(self, marker, now):
         """Begins a turn; `grant` ends it."""
+        self.until_arrived(marker)
         with self.lock:
             self.marker, self.sends = marker, 0
-            # Everything that was sent before the turn arrives before its marker: nothing runs until then.
-            self.awaited = {
-                source._clock_sub.handle.pointer for source in self.sources if source._clock_sub is not None
-            }
             if now > self.now:
                 self.now = now
                 due = sorted(entry[:2] for entry in self.sleepers if entry[0] <= now)
@@ -238,6 +235,27 @@ class Keeper:
             self.open = True
             self.polled.clear()
             self.grant()
+
+    def until_arrived(self, marker):
+        """Waits for the marker of a turn: everything that was sent before the turn has arrived then."""
+        if self.turns is None:
+            return
+        from rosgraph_msgs.msg import Clock
+
+        try:
+            context = self.own.context
+            with self.turns.handle, context.handle:
+                while self.held:
+                    taken = self.turns.handle.take_message(Clock, False)
+                    if taken is not None and taken[0].clock.sec >= marker:
+                        return
+                    if taken is None:
+                        waiting = _WaitSet(1, 0, 0, 0, 0, 0, context.handle)
+                        waiting.clear_entities()
+                        waiting.add_subscription(self.turns.handle)
+                        waiting.wait(int(_LOOK_S * 1e9))
+        except Exception:  # The context was shut down: nothing comes any more.
+            return
 
     def set_time(self):
         """Sets the clocks of all nodes of the process at once, so that no node is ahead of another."""
@@ -288,7 +306,7 @@ class Keeper:
         if self.foreign == 0:
             self.open = False
             faults, self.faults = self.faults, []
-            if self.sends:
+            if self.sends and self.marks is not None:
                 self.mark()
             self.send({"idle": self.marker, "sends": self.sends, "faults": faults})
 
@@ -305,15 +323,12 @@ class Keeper:
         from rosgraph_msgs.msg import Clock
 
         message = Clock()
-        message.clock.sec = self.marker
-        message.clock.nanosec = os.getpid()
-        for node in sorted(self.nodes, key=lambda node: node._keeper_serial):
-            try:
-                with node._keeper_mark.handle:
-                    _publish(node._keeper_mark.handle, message)
-                return
-            except Exception:  # The node was destroyed: the next one.
-                continue
+        message.clock.sec, message.clock.nanosec = self.marker, os.getpid()
+        try:
+            with self.marks.handle:
+                _publish(self.marks.handle, message)
+        except Exception:  # The context was shut down: the simulation sees the process end.
+            return
 
     # Waiting.
 
@@ -410,11 +425,6 @@ class Keeper:
         if timeout_ns > 0 and wait_set.timers:
             found["timer"].discard(wait_set.timers[-1])
             wait_set.limited = True
-        if any(it in self.awaited and it not in found["subscription"] for it in wait_set.subscriptions):
-            wait_set.clear_entities()
-            _sleep(0.00005)
-            return
-        self.awaited.difference_update(wait_set.subscriptions)
         # Timers of rcl's own that do nothing, see `_patient`.
         found["timer"].difference_update(
             pointer for pointer in found["timer"].difference(wait_set.timers) if self.tried("timer", pointer)
@@ -472,6 +482,8 @@ class Keeper:
                         found.append(["action", name, int(waitable.server_is_ready())])
             except Exception:  # A node that is being destroyed has nothing to match.
                 continue
+        ours = self.marks.get_subscription_count() if self.marks is not None else 1
+        found.append(["publisher", MARK, ours])
         return {"nodes": [node.get_fully_qualified_name() for node in self.nodes], "executors": len(self.executors), "ends": found}
 
 
@@ -485,12 +497,13 @@ def _place(frame):
     return ""
 
 
-_publish = None
+#: rclpy's own, before they are replaced.
+_publish = _WaitSet = None
 
 
 def install(executors, address):
     """Puts the keeper between rclpy and the node. `executors` is the module `rclpy.executors`."""
-    global _publish
+    global _publish, _WaitSet
     from rclpy import clock, node, time_source, timer
     from rclpy.clock_type import ClockType
     from rclpy.impl.implementation_singleton import rclpy_implementation as native
@@ -499,7 +512,7 @@ def install(executors, address):
 
     keeper = Keeper(address)
     serial = iter(range(1, 1 << 62))
-    _publish = native.Publisher.publish
+    _publish, _WaitSet = native.Publisher.publish, native.WaitSet
 
     class WaitSet(native.WaitSet):
         def __init__(self, *counts):
@@ -568,12 +581,9 @@ def install(executors, address):
         keeper.sources.add(self)
         source_made(self, *args, **kwargs)
 
-    def told_time(self, message):
-        if not keeper.held:
-            hears(self, message)
-
-    hears = time_source.TimeSource.clock_callback
-    time_source.TimeSource.__init__, time_source.TimeSource.clock_callback = make_source, told_time
+    # The time comes with the turns, for all nodes of a process at once.
+    time_source.TimeSource.__init__ = make_source
+    time_source.TimeSource._subscribe_to_clock_topic = lambda self: None
     sleeps = clock.Clock.sleep_until
 
     def sleep_until(self, until, context=None):
@@ -612,6 +622,16 @@ def install(executors, address):
     node_made = node.Node.__init__
     patient = _patient(keeper)
 
+    def make_own(context):
+        from rosgraph_msgs.msg import Clock
+
+        qos = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
+        own = node.Node.__new__(node.Node)
+        plain = {"context": context, "start_parameter_services": False, "enable_rosout": False, "use_global_arguments": False}
+        node_made(own, f"_actcheck_keeper_{os.getpid()}", **plain)
+        keeper.own, keeper.marks = own, publishes(own, Clock, MARK, qos)
+        keeper.turns = subscribes(own, Clock, f"{TURN}{os.getpid()}", lambda _: None, qos)
+
     def make_node(self, *args, **kwargs):
         given = list(kwargs.get("parameter_overrides") or [])
         if not any(parameter.name == "use_sim_time" for parameter in given):
@@ -619,11 +639,10 @@ def install(executors, address):
         kwargs["parameter_overrides"] = given
         patient()
         node_made(self, *args, **kwargs)
-        from rosgraph_msgs.msg import Clock
-
         self._keeper_serial = next(serial)
-        self._keeper_mark = self.create_publisher(Clock, MARK, 1000)
         keeper.nodes.add(self)
+        if keeper.own is None:
+            make_own(self.context)
 
     node.Node.__init__ = make_node
 
