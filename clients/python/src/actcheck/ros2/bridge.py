@@ -39,7 +39,7 @@ SETTLE_S = 0.2
 class RunOfNodes:
     """The nodes, the simulated robot and the clock of one run."""
 
-    def __init__(self, mapping: SkillMapping, session: Session, free_running: bool, domain: Domain, seed: int) -> None:
+    def __init__(self, mapping: SkillMapping, session: Session, free_running: bool, domain: Domain, call: Call) -> None:
         self._mapping, self._session, self._domain = mapping, session, domain
         self._description = session.description
         self._now, self._ticks = BEGINNING, 0
@@ -60,7 +60,7 @@ class RunOfNodes:
         self._every = max(1, round(1.0 / (mapping.rate_hz * self._description.control_period_s)))
         self._camera_every = max(1, round(1.0 / (mapping.camera_hz * self._description.control_period_s))) if mapping.camera_hz else 0
         self._begun = False
-        self._env = self._environment(seed, free_running)
+        self._env = self._environment(call, free_running)
 
     def start(self, seen: Observation) -> None:
         """Starts the nodes, and waits until all have found each other. Raises `BrokenNode`."""
@@ -224,13 +224,13 @@ class RunOfNodes:
                     "its launcher; --free-running tests it without a promise that runs repeat"
                 )
 
-    def _environment(self, seed: int, free_running: bool) -> dict[str, str]:
+    def _environment(self, call: Call, free_running: bool) -> dict[str, str]:
         """Environment variables of the nodes."""
         env = dict(os.environ)
         # Domains are the bridge's; messages go through memory of the kernel, of which nothing is left after a kill.
         env.update(ROS_DOMAIN_ID=str(self._domain.number), **NETWORK)
         # Output without wall-clock times, and the same order of sets in every process.
-        env.update(RCUTILS_CONSOLE_OUTPUT_FORMAT="[{severity}] [{name}]: {message}", PYTHONHASHSEED="0", ACTCHECK_SEED=str(seed))
+        env.update(RCUTILS_CONSOLE_OUTPUT_FORMAT="[{severity}] [{name}]: {message}", PYTHONHASHSEED="0", ACTCHECK_SEED=str(call.seed), ACTCHECK_INDEX=str(call.index))
         for name in ("ACTCHECK_ADDRESS", "ACTCHECK_ROS_KEEPER"):
             env.pop(name, None)
         if not free_running:
@@ -241,8 +241,12 @@ class RunOfNodes:
         return env
 
 
-#: Settings of the middleware, for the bridge and the nodes: loopback only, and no shared memory.
-NETWORK = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"}
+#: Settings of the middleware, for the bridge and the nodes: those of `loopback.xml`. Other ranges replace its transports.
+NETWORK = {
+    "FASTDDS_DEFAULT_PROFILES_FILE": str(Path(__file__).parent / "loopback.xml"),
+    "ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT",
+    "ROS_LOCALHOST_ONLY": "0",
+}
 
 
 class Bridge:
@@ -276,7 +280,7 @@ class Bridge:
         if self._run is None:
             domain = Domain(self._last_domain)
             self._last_domain = domain.number
-            self._run = RunOfNodes(self._mapping, session, self._free_running, domain, call.seed)
+            self._run = RunOfNodes(self._mapping, session, self._free_running, domain, call)
         return self._run
 
     def _end_run(self) -> None:

@@ -90,6 +90,11 @@ class Lockstep:
         self._now = now
         # The order of turns must not depend on who was faster at the start.
         self.kept.sort(key=lambda kept: kept.order)
+        since = time.monotonic()
+        while any(kept.turns.get_subscription_count() == 0 for kept in self.kept):
+            if time.monotonic() - since > self._limit_s:
+                raise BrokenNode("a process has no node, or the network does not let messages pass")
+            time.sleep(0.01)
         for kept in self.kept:
             self._send(kept, {"hold": now})
             if self._receive(kept)["held"] == 0:
