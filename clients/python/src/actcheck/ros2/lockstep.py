@@ -130,7 +130,9 @@ class Lockstep:
                 found.append({"nodes": [], "executors": 1, "ends": [["client", MARK, 0]]})
                 continue
             self._send(kept, {"graph": True})
-            found.append(self._receive(kept)["graph"])
+            graph = self._receive(kept)["graph"]
+            _raise(kept, graph["faults"])
+            found.append(graph)
         return found
 
     def barrier(self, now: int) -> None:
@@ -157,11 +159,12 @@ class Lockstep:
         kept.turns.publish(Clock(clock=Time(sec=self._turn)))
         self._send(kept, {"turn": self._turn, "now": self._now})
         reply = self._receive(kept)
-        for fault in reply["faults"]:
-            place = f" ({fault['place']})" if fault["place"] else ""
-            raise BrokenNode(f"{kept.program} can't be kept in step: {fault['words']}{place}")
+        _raise(kept, reply["faults"])
         if not reply["sends"]:
             return
+        if not reply["marked"]:
+            self._alive()
+            raise BrokenNode(f"{kept.program} shut its ROS context down, or destroyed what the keeper needs")
         self._until_marked(kept)
         before = self._handled
         self.drain()
@@ -272,6 +275,13 @@ class FreeRunning:
         """Performs all callbacks that are ready."""
         while performed(self._executor, 0.0):
             pass
+
+
+def _raise(kept: Kept, faults: list[dict[str, str]]) -> None:
+    """Raises the first fault of a process that can't be kept in step."""
+    for fault in faults:
+        place = f" ({fault['place']})" if fault["place"] else ""
+        raise BrokenNode(f"{kept.program} can't be kept in step: {fault['words']}{place}")
 
 
 def performed(executor: Executor, seconds: float) -> bool:

@@ -324,12 +324,13 @@ class RosRobot:
         if names.camera and description.camera:
             for name, kind in (("depth/image_rect_raw", Image), ("depth/camera_info", CameraInfo), ("depth/points", PointCloud2)):
                 self._camera[name] = node.create_publisher(kind, f"{names.camera}/{name}", 5)
-        self.trajectories, self._controllers = [], []
+        self._trajectories: list[TrajectoryController] = []
+        self._controllers: list[Controller] = []
         moving = [joint.name for joint in description.joints if joint.role == "other"]
         for name, joints in ((names.arm, [*description.arm_joints, *moving]), (names.head, list(description.head_joints))):
             if name and joints:
                 controller = TrajectoryController(node, FollowJointTrajectory, name, joints, description.control_period_s)
-                self.trajectories.append(controller)
+                self._trajectories.append(controller)
                 self._controllers.append(controller)
         if names.gripper and description.gripper_joints:
             self._controllers.append(GripperController(node, GripperCommand, names.gripper, description))
@@ -378,7 +379,7 @@ class RosRobot:
     def measure(self, seen: Observation) -> dict[str, float]:
         """Gives the controllers the measured positions, by joint."""
         positions = dict(zip((joint.name for joint in self._description.joints), seen.positions.tolist()))
-        for controller in self.trajectories:
+        for controller in self._trajectories:
             controller.measure(positions)
         return positions
 
@@ -489,7 +490,7 @@ def moved(joint: UrdfJoint, positions: dict[str, float]) -> Matrix:
 
 def seconds(duration: Any) -> float:
     """A duration in seconds."""
-    return float(duration.sec) + duration.nanosec * 1e-9
+    return float(duration.sec + duration.nanosec * 1e-9)
 
 
 def time_of(now: int) -> Time:

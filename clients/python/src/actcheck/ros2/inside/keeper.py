@@ -306,9 +306,8 @@ class Keeper:
         if self.foreign == 0:
             self.open = False
             faults, self.faults = self.faults, []
-            if self.sends and self.marks is not None:
-                self.mark()
-            self.send({"idle": self.marker, "sends": self.sends, "faults": faults})
+            marked = self.sends > 0 and self.marks is not None and self.mark()
+            self.send({"idle": self.marker, "sends": self.sends, "marked": marked, "faults": faults})
 
     def begin(self, parked):
         if parked.work is None:
@@ -319,7 +318,10 @@ class Keeper:
             self.queue.append(parked)
 
     def mark(self):
-        """Sends a message behind all others of this turn, so that the simulation knows when they have arrived."""
+        """Sends a message behind all others of this turn, so that the simulation knows when they have arrived.
+
+        Returns whether it could.
+        """
         from rosgraph_msgs.msg import Clock
 
         message = Clock()
@@ -327,8 +329,9 @@ class Keeper:
         try:
             with self.marks.handle:
                 _publish(self.marks.handle, message)
-        except Exception:  # The context was shut down: the simulation sees the process end.
-            return
+        except Exception:  # The context was shut down.
+            return False
+        return True
 
     # Waiting.
 
@@ -484,7 +487,8 @@ class Keeper:
                 continue
         ours = self.marks.get_subscription_count() if self.marks is not None else 1
         found.append(["publisher", MARK, ours])
-        return {"nodes": [node.get_fully_qualified_name() for node in self.nodes], "executors": len(self.executors), "ends": found}
+        faults, self.faults = self.faults, []
+        return {"faults": faults, "nodes": [node.get_fully_qualified_name() for node in self.nodes], "executors": len(self.executors), "ends": found}
 
 
 def _place(frame):
