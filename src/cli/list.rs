@@ -14,7 +14,7 @@ use crate::where_rows::{Condition, matching_runs};
 use crate::{history_dir, output, rules};
 use actcheck_base::{Diagnostics, Outcome, did_you_mean, names};
 use actcheck_history::{History, JudgedOutcome, Judgements, RunFilter, RunRow, Wish};
-use actcheck_report::Table;
+use actcheck_report::{Table, shortened};
 
 /// Number of rows that are formatted and printed together.
 const ROWS_AT_A_TIME: usize = 10_000;
@@ -103,12 +103,14 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
         )?;
         runs.retain(|row| found.contains(&row.run));
     }
+    // A list of failures for people says what failed instead of all values.
+    let all = !args.failed || args.format != Format::Text;
     // Most campaigns have neither, so empty columns are hidden.
     let repeated = runs.iter().any(|row| row.repetition.is_some());
     let weighted = runs.iter().any(|row| row.weight.is_some());
     let columns: [(&str, bool, Cell); 9] = [
         ("run", true, |row| row.run.as_str().into()),
-        ("index", true, |row| row.index.into()),
+        ("index", all, |row| row.index.into()),
         ("scene", repeated, |row| {
             row.repetition.map(|repetition| repetition.scene).into()
         }),
@@ -116,10 +118,10 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
             row.repetition.map(|repetition| repetition.number).into()
         }),
         ("test", true, |row| row.test.as_str().into()),
-        ("status", true, |row| row.status.word().into()),
-        ("score", true, |row| row.score.into()),
+        ("status", all, |row| row.status.word().into()),
+        ("score", all, |row| row.score.into()),
         ("weight", weighted, |row| row.weight.into()),
-        ("trace_hash", true, |row| row.trace_hash.as_str().into()),
+        ("trace_hash", all, |row| row.trace_hash.as_str().into()),
     ];
     let shown: Vec<_> = columns.into_iter().filter(|(_, shown, _)| *shown).collect();
     let mut table = Table::new(shown.iter().map(|(name, ..)| *name)).with_expendable([
@@ -213,10 +215,6 @@ fn outcome(word: &str) -> Result<Outcome, OptionFault> {
         .ok_or_else(|| did_you_mean(word, Outcome::ALL.map(Outcome::word)).into())
 }
 
-/// Longest reason of a failure in a list; of a longer one, only the first part is printed. Unit:
-/// characters.
-const LONGEST_REASON: usize = 90;
-
 /// The first reason why a run failed. Empty if its details can't be read, which other commands
 /// report.
 fn reason(history: &History, run: &str) -> String {
@@ -225,12 +223,7 @@ fn reason(history: &History, run: &str) -> String {
     let failed = judgements
         .flat_map(|action| &action.judgements)
         .find(|judgement| judgement.outcome == Outcome::Failed);
-    let reason = failed.map_or("", |judgement| judgement.witness.as_str());
-    let too_long = reason.chars().count() > LONGEST_REASON;
-    match reason.split_once("; ").filter(|_| too_long) {
-        Some((first, _)) => format!("{first}; …"),
-        None => reason.to_owned(),
-    }
+    failed.map_or_else(String::new, |judgement| shortened(&judgement.witness))
 }
 
 /// The runs that the options choose.

@@ -51,5 +51,6 @@ pub use table::{
 pub use text::{
     FailureLines, Page, campaign_result_text, campaign_runs_text, campaign_text, case_text,
     compare_text, engines_text, findings_text, health_lines, health_text, labels_text,
-    oracles_text, recheck_text, relations_text, run_text, scene_rule, shrunk_text, skill_text,
+    oracles_text, recheck_text, relations_text, run_text, scene_rule, shortened, shrunk_text,
+    skill_text,
 };

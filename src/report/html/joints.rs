@@ -6,15 +6,16 @@ use crate::html::pack::Pack;
 use actcheck_data::{JointMoment, Motion, MotionRow, Trace};
 
 /// Steps of base poses and of positions of joints. Unit: metres or radians.
-const POSITION_STEP: f32 = 5e-4;
-/// Steps of velocities. Unit: metres or radians in a second.
-const VELOCITY_STEP: f32 = 5e-3;
+const POSITION_STEP: f32 = 1e-3;
 /// Steps of efforts. Unit: newtons or newton metres.
-const EFFORT_STEP: f32 = 0.25;
+const EFFORT_STEP: f32 = 0.5;
 
 /// The motion of each action: the names of the joints; the first moment and the interval, in
-/// seconds since the action began; and the columns: base pose by the truth and by belief, then
-/// position, velocity, effort and target of each joint.
+/// seconds since the action began; and the columns: the true base pose, then position, effort, and
+/// distance of the target from the position of each joint.
+///
+/// The page derives velocities from positions. The believed base pose is the position of the base's
+/// joints.
 pub(super) fn joints(pack: &mut Pack, trace: &Trace) -> Value {
     let courses = trace.robot_courses.iter();
     courses
@@ -29,31 +30,19 @@ fn of_action(pack: &mut Pack, motion: &Motion) -> Value {
     };
     let intervals = moments.len().saturating_sub(1).max(1) as f64;
     let period = f64::from(last.time_secs - first.time_secs) / intervals;
-    let of_base = |value: fn(&MotionRow<'_>) -> [f32; 3]| {
-        (0..3).map(move |axis| (value, axis)).collect::<Vec<_>>()
+    let base = |axis: usize| {
+        let values = moments.iter().map(move |moment| moment.base_true[axis]);
+        steps(values, POSITION_STEP)
     };
-    let mut columns: Vec<Vec<i16>> = [
-        of_base(|moment| moment.base_true),
-        of_base(|moment| moment.base_believed),
-    ]
-    .concat()
-    .into_iter()
-    .map(|(value, axis)| {
-        steps(
-            moments.iter().map(|moment| value(moment)[axis]),
-            POSITION_STEP,
-        )
-    })
-    .collect();
+    let mut columns: Vec<Vec<i16>> = (0..3).map(base).collect();
     let by_joint: Vec<Vec<JointMoment>> = moments
         .iter()
         .map(|moment| moment.joints().collect())
         .collect();
-    let parts: [(fn(&JointMoment) -> f32, f32); 4] = [
+    let parts: [(fn(&JointMoment) -> f32, f32); 3] = [
         (|joint| joint.position, POSITION_STEP),
-        (|joint| joint.velocity, VELOCITY_STEP),
         (|joint| joint.effort, EFFORT_STEP),
-        (|joint| joint.target, POSITION_STEP),
+        (|joint| joint.target - joint.position, POSITION_STEP),
     ];
     for joint in 0..motion.joints.len() {
         for (value, step) in parts {
@@ -62,7 +51,7 @@ fn of_action(pack: &mut Pack, motion: &Motion) -> Value {
     }
     json!({
         "names": motion.joints, "start": first.time_secs, "period": period, "columns": columns.len(),
-        "steps": [POSITION_STEP, VELOCITY_STEP, EFFORT_STEP], "rows": pack.trajectories(&columns),
+        "steps": [POSITION_STEP, EFFORT_STEP], "rows": pack.trajectories(&columns),
     })
 }
 
@@ -108,7 +97,7 @@ mod tests {
         };
         let packed = joints(&mut Pack::default(), &trace);
         assert_eq!(packed[0]["names"], json!(["lift"]));
-        assert_eq!(packed[0]["columns"], json!(10));
+        assert_eq!(packed[0]["columns"], json!(6));
         assert_eq!(packed[0]["rows"]["length"], json!(1));
         assert_eq!(packed[1], Value::Null);
         assert_eq!(

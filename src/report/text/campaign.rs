@@ -278,7 +278,7 @@ fn scores(out: &mut String, summary: &CampaignSummary) {
         count => format!("{count} runs"),
     };
     if let Some(rate) = summary.pass_rate() {
-        let _ = writeln!(out, "everything passed in {rate} runs");
+        let _ = writeln!(out, "runs in which everything passed: {rate}");
     }
     let score = |value: f64| format!("{value:.2}");
     let total = summary.total_score();
@@ -454,6 +454,19 @@ impl Kind<'_> {
     }
 }
 
+/// Longest reason of a failure in a list; of a longer one, only the first part is printed. Unit:
+/// characters.
+const LONGEST_REASON: usize = 90;
+
+/// The first part of a reason that is too long for a list.
+pub fn shortened(reason: &str) -> String {
+    let too_long = reason.chars().count() > LONGEST_REASON;
+    match reason.split_once("; ").filter(|_| too_long) {
+        Some((first, _)) => format!("{first}; …"),
+        None => reason.to_owned(),
+    }
+}
+
 /// The kinds of failures, each with the first reasons of its first runs, and the command for more.
 fn failures_text(summary: &CampaignSummary) -> String {
     let mut out = String::new();
@@ -474,7 +487,7 @@ fn failures_text(summary: &CampaignSummary) -> String {
                 }
                 (None, None) => String::new(),
             };
-            let _ = writeln!(out, "  {}  {reason}", run.id);
+            let _ = writeln!(out, "  {}  {}", run.id, shortened(&reason));
         }
         match kind.runs.len().saturating_sub(RUNS_OF_A_KIND) {
             0 => {}

@@ -24,7 +24,7 @@ mod shrunk;
 mod skill;
 mod weighted;
 
-pub use campaign::{campaign_result_text, campaign_runs_text, campaign_text};
+pub use campaign::{campaign_result_text, campaign_runs_text, campaign_text, shortened};
 pub use case::case_text;
 pub(crate) use case::regressions_text;
 pub use compare::compare_text;

@@ -65,16 +65,13 @@ pub fn skill_text(trace: &Trace, page: Page) -> String {
 fn commanded(stretch: &CommandStretch, start: f64, begin_secs: f64) -> String {
     let end = stretch.end_secs - begin_secs;
     let targets = targets(&stretch.targets);
-    let commands = match stretch.commands {
-        1 => "commands".to_owned(),
-        several => format!("{several} commands, at last"),
+    let words = match (stretch.commands, targets.is_empty()) {
+        (1, true) => "waits".to_owned(),
+        (several, true) => format!("{several} commands without new targets"),
+        (1, false) => format!("commands {targets}"),
+        (several, false) => format!("{several} commands, at last {targets}"),
     };
-    let to = if targets.is_empty() {
-        "no new targets"
-    } else {
-        targets.as_str()
-    };
-    format!("{commands} {to}, {:.2} s", end - start)
+    format!("{words}, {:.2} s", end - start)
 }
 
 /// Targets in words: `opening 8 cm, force 20 N, arm_lift_joint 0.3`.

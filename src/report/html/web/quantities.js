@@ -17,7 +17,7 @@ function quantitiesOf(replay, course, forms) {
   if (course.grasp) things.push({ name: "gripper", path: () => times.map((secs) => course.hand(secs)), turns: false });
   const found = [], add = (group, name, unit, values, more = {}) => found.push({ group, name: group === "" ? name : `${group}: ${name}`, short: name, unit, values, ...more });
   for (const thing of things) quantitiesOfThing(thing, course.period, first, (...args) => add(thing.name, ...args));
-  if (replay.joints?.some((of) => of)) quantitiesOfJoints(replay, times, add);
+  if (replay.joints?.some((of) => of)) quantitiesOfJoints(replay, times, course.period, add);
   for (const action of replay.actions) for (const [name] of action.phases ?? []) {
     if (found.some((one) => one.phase === name)) continue;
     add("phases", name, BARE, () => times.map((secs) => Number(replay.actions.some((of) => isInPhase(of, name, secs)))), { phase: name, step: true });
@@ -62,32 +62,29 @@ function quantitiesOfThing({ path, turns }, period, first, add) {
   });
 }
 
-/** Position, velocity, effort and target of each joint, and the base by truth and by belief. */
-function quantitiesOfJoints(replay, times, add) {
+/** Position, velocity, effort and target of each joint, and the true pose of the base. */
+function quantitiesOfJoints(replay, times, period, add) {
   const columns = replay.joints.map((of) => of && columnsOf(of.rows, of.columns));
-  const column = (pick) => () => {
+  /** A column in steps of `steps[kind]`; `pick` gives its place in an action, or −1. */
+  const column = (pick, kind) => {
     const values = times.map(() => NaN);
     replay.joints.forEach((of, i) => {
-      const action = replay.actions[i];
-      if (!of || action?.start === undefined) return;
-      const [at, step] = pick(of);
-      if (at < 0) return;
+      const action = replay.actions[i], at = of ? pick(of) : -1;
+      if (at < 0 || action?.start === undefined) return;
       times.forEach((secs, frame) => {
         const row = Math.round((secs - action.start - of.start) / (of.period || 1));
-        if (row >= 0 && row < of.rows.frames) values[frame] = columns[i][at][row] * step;
+        if (row >= 0 && row < of.rows.frames) values[frame] = columns[i][at][row] * of.steps[kind];
       });
     });
     return values;
   };
-  const [position] = replay.joints.find((of) => of).steps;
-  [["true", 0], ["believed", 3]].forEach(([belief, at]) => ["x", "y", "heading"].forEach((name, i) =>
-    add("base", `${belief} ${name}`, name === "heading" ? "rad" : "m", column(() => [at + i, position]))));
-  const names = [...new Set(replay.joints.flatMap((of) => of?.names ?? []))];
-  for (const joint of names) {
-    ["position", "velocity", "effort", "target"].forEach((name, i) => add(`joint ${joint}`, name, BARE, column(({ names, steps }) => {
-      const at = names.indexOf(joint);
-      return [at < 0 ? -1 : 6 + 4 * at + i, steps[i] ?? steps[0]];
-    })));
+  ["x", "y", "heading"].forEach((name, i) => add("base", `true ${name}`, name === "heading" ? "rad" : "m", () => column(() => i, 0)));
+  for (const joint of new Set(replay.joints.flatMap((of) => of?.names ?? []))) {
+    const part = (i, kind) => column(({ names }) => { const at = names.indexOf(joint); return at < 0 ? -1 : 3 + 3 * at + i; }, kind);
+    add(`joint ${joint}`, "position", BARE, () => part(0, 0));
+    add(`joint ${joint}`, "velocity", BARE, () => slopes(part(0, 0), period));
+    add(`joint ${joint}`, "effort", BARE, () => part(1, 1));
+    add(`joint ${joint}`, "target", BARE, () => { const off = part(2, 0); return part(0, 0).map((value, frame) => value + off[frame]); });
   }
 }
 

@@ -58,6 +58,7 @@ function commanded({ commands, secs, until, targets }) {
       default: return `${kind} ${shown}`;
     }
   });
-  const what = words.length ? words.join(", ") : "no new targets";
-  return `${commands === 1 ? "commands" : `${commands} commands, at last`} ${what}, ${(until - secs).toFixed(2)}${THIN}s`;
+  const what = words.length ? `${commands === 1 ? "commands" : `${commands} commands, at last`} ${words.join(", ")}`
+    : commands === 1 ? "waits" : `${commands} commands without new targets`;
+  return `${what}, ${(until - secs).toFixed(2)}${THIN}s`;
 }
