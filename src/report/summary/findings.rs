@@ -249,6 +249,21 @@ fn plain_condition(condition: &Condition, parameter: &Parameter) -> String {
             return format!("the robot saw the {thing} {amount} beside its place");
         }
     }
+    if let (
+        Some(of),
+        Condition::Range {
+            low: Some(low),
+            high: None,
+            ..
+        },
+    ) = (bare.strip_suffix("_perceived_off"), condition)
+    {
+        let thing = of.replace('_', " ");
+        return format!(
+            "the {thing} was perceived {} or more off its place",
+            value(*low)
+        );
+    }
     let name = match bare.strip_prefix(DRAWN) {
         Some(of) => format!("the error of {}", of.replace('_', " ")),
         None => format!("the {}", bare.replace('_', " ")),

@@ -15,8 +15,9 @@ use actcheck_history::SkillRecord;
 /// Maximum number of rows in the table of runs. The text names the command that lists the rest.
 const RUNS_SHOWN: usize = 40;
 /// Maximum number of kinds of failures that are described.
-const KINDS_SHOWN: usize = 8;
-/// Maximum number of runs of a kind of failure that are described.
+const KINDS_SHOWN: usize = 6;
+/// Maximum number of runs of the most frequent kind of failure that are described; of the others,
+/// one.
 const RUNS_OF_A_KIND: usize = 3;
 
 /// Formats the pass rates of the properties, the scores, and the kinds of failures with examples.
@@ -472,9 +473,13 @@ fn failures_text(summary: &CampaignSummary) -> String {
     let mut out = String::new();
     let kinds = kinds(summary);
     let several = by_action::has_several_actions(summary);
-    for kind in kinds.iter().take(KINDS_SHOWN) {
-        let _ = writeln!(out, "\n{}:", kind.title(summary));
-        for run in kind.runs.iter().take(RUNS_OF_A_KIND) {
+    let shown_of = |number: usize| if number == 0 { RUNS_OF_A_KIND } else { 1 };
+    for (number, kind) in kinds.iter().take(KINDS_SHOWN).enumerate() {
+        if number == 0 {
+            out.push('\n');
+        }
+        let _ = writeln!(out, "{}:", kind.title(summary));
+        for run in kind.runs.iter().take(shown_of(number)) {
             let reason = match (&run.reason, failed_of(run).next()) {
                 (Some(reason), _) => reason.clone(),
                 (None, Some((action, judgement))) => {
@@ -489,19 +494,13 @@ fn failures_text(summary: &CampaignSummary) -> String {
             };
             let _ = writeln!(out, "  {}  {}", run.id, shortened(&reason));
         }
-        match kind.runs.len().saturating_sub(RUNS_OF_A_KIND) {
-            0 => {}
-            more => {
-                let _ = writeln!(out, "  … {more} more");
-            }
-        }
     }
     if kinds.len() > KINDS_SHOWN {
         let more: usize = kinds[KINDS_SHOWN..]
             .iter()
             .map(|kind| kind.runs.len())
             .sum();
-        let _ = writeln!(out, "\n{more} runs failed in other ways");
+        let _ = writeln!(out, "{more} runs failed in other ways");
     }
     let Some(first) = kinds.first().and_then(|kind| kind.runs.first()) else {
         return out;
@@ -514,7 +513,8 @@ fn failures_text(summary: &CampaignSummary) -> String {
     let shown: usize = kinds
         .iter()
         .take(KINDS_SHOWN)
-        .map(|kind| kind.runs.len().min(RUNS_OF_A_KIND))
+        .enumerate()
+        .map(|(number, kind)| kind.runs.len().min(shown_of(number)))
         .sum();
     if shown < kinds.iter().map(|kind| kind.runs.len()).sum() {
         let _ = writeln!(out, "all of them: {}", command(&summary.failed_runs()));

@@ -55,7 +55,7 @@ pub fn findings_text(summary: &FindingsSummary, figures: bool, page: Page) -> St
     }
     modes(&mut out, summary, page);
     cascades(&mut out, summary);
-    collisions(&mut out, &summary.collisions, page);
+    collisions(&mut out, &summary.collisions, (figures, page));
     for report in &summary.properties {
         property(&mut out, report, summary, (figures, page));
     }

@@ -15,7 +15,7 @@ function quantitiesOf(replay, course, forms) {
   };
   const things = slots.map(([track, slot]) => ({ name: track.name, path: () => posesOf(slot), form: forms[track.form], turns: true }));
   if (course.grasp) things.push({ name: "gripper", path: () => times.map((secs) => course.hand(secs)), turns: false });
-  const found = [], add = (group, name, unit, values, more = {}) => found.push({ group, name: group === "" ? name : `${group}: ${name}`, short: name, unit, values, ...more });
+  const found = [], add = (group, name, unit, values, more = {}) => found.push({ group, name: group.startsWith("joint ") ? `${name} of ${group.slice(6)}` : ["phases", "contacts", "pairs"].includes(group) ? name : `${name} of ${group}`, short: name, unit, values, ...more });
   for (const thing of things) quantitiesOfThing(thing, course.period, first, (...args) => add(thing.name, ...args));
   if (replay.joints?.some((of) => of)) quantitiesOfJoints(replay, times, course.period, add);
   for (const action of replay.actions) for (const [name] of action.phases ?? []) {

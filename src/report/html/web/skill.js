@@ -23,7 +23,7 @@ function skillPanel(replay, seek) {
     now = row;
     if (!row) return;
     row.setAttribute("aria-current", "true");
-    list.scrollTop = Math.max(0, row.offsetTop - list.offsetTop - list.clientHeight / 2);
+    list.scrollTop = Math.max(0, row.offsetTop + row.offsetHeight / 2 - list.clientHeight / 2);
   };
   const element = make("section", { class: "skill" },
     make("h2", {}, "The program's side"),
