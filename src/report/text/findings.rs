@@ -55,7 +55,10 @@ pub fn findings_text(summary: &FindingsSummary, figures: bool, page: Page) -> St
     }
     modes(&mut out, summary, page);
     cascades(&mut out, summary);
-    collisions(&mut out, &summary.collisions, (figures, page));
+    // They are not about one property.
+    if figures || summary.properties.len() != 1 {
+        collisions(&mut out, &summary.collisions, (figures, page));
+    }
     for report in &summary.properties {
         property(&mut out, report, summary, (figures, page));
     }
