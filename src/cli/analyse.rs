@@ -38,8 +38,8 @@ const LEVEL: f64 = 0.05;
 /// `actcheck analyse`
 #[derive(Debug, Args)]
 pub struct AnalyseArgs {
-    /// Only this property, by its name in the ontology (may be given several times); also prints
-    /// heat maps
+    /// Only this property, by its name in the ontology (may be given several times); with `-v`, also
+    /// prints heat maps
     #[arg(long, value_name = "P")]
     pub property: Vec<String>,
     /// Failures by one or two parameters, such as `target_category,target_turned_rad`, instead of
@@ -60,6 +60,10 @@ pub struct AnalyseArgs {
     /// The runs to analyse, and their history.
     #[command(flatten)]
     pub chosen: ChosenRuns,
+    /// Print intervals, p-values and other figures of the patterns, the extent of the search, the
+    /// places of collisions and the usual heat maps
+    #[arg(long, short)]
+    pub verbose: bool,
     /// How it is printed (csv: the patterns, or with --by the cells of the map; json: everything)
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: Format,
@@ -96,7 +100,7 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
         property: &args.property,
         by: &args.by,
         // In a text about all properties they would be too long.
-        usual_maps: !args.property.is_empty() || args.format != Format::Text,
+        usual_maps: (args.verbose && !args.property.is_empty()) || args.format != Format::Text,
     };
     let summary = analysed(&asked, &history, &[])?.summary;
     if let Some(picture) = picture {
@@ -119,7 +123,7 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
         return Ok(());
     }
     output::print(&match args.format {
-        Format::Text => findings_text(&summary, output::page()),
+        Format::Text => findings_text(&summary, args.verbose, output::page()),
         Format::Csv if !args.by.is_empty() => {
             maps_table(&summary).render(args.format.into(), output::page())
         }

@@ -14,7 +14,7 @@ use crate::where_rows::{Condition, matching_runs};
 use crate::{history_dir, output, rules};
 use actcheck_base::{Diagnostics, Outcome, did_you_mean, names};
 use actcheck_history::{History, JudgedOutcome, Judgements, RunFilter, RunRow, Wish};
-use actcheck_report::Table;
+use actcheck_report::{Table, shortened};
 
 /// Number of rows that are formatted and printed together.
 const ROWS_AT_A_TIME: usize = 10_000;
@@ -87,7 +87,11 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
         campaign: args.campaign.clone(),
         ..RunFilter::default()
     };
-    let (mut runs, words) = chosen_runs(args, &history, &filter)?;
+    let ChosenRuns {
+        mut runs,
+        words,
+        failed,
+    } = chosen_runs(args, &history, &filter)?;
     if !args.conditions.is_empty() {
         let campaign = args.campaign.as_ref();
         let found = matching_runs(
@@ -99,12 +103,14 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
         )?;
         runs.retain(|row| found.contains(&row.run));
     }
+    // A list of failures for people says what failed instead of all values.
+    let all = !args.failed || args.format != Format::Text;
     // Most campaigns have neither, so empty columns are hidden.
     let repeated = runs.iter().any(|row| row.repetition.is_some());
     let weighted = runs.iter().any(|row| row.weight.is_some());
     let columns: [(&str, bool, Cell); 9] = [
         ("run", true, |row| row.run.as_str().into()),
-        ("index", true, |row| row.index.into()),
+        ("index", all, |row| row.index.into()),
         ("scene", repeated, |row| {
             row.repetition.map(|repetition| repetition.scene).into()
         }),
@@ -112,18 +118,23 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
             row.repetition.map(|repetition| repetition.number).into()
         }),
         ("test", true, |row| row.test.as_str().into()),
-        ("status", true, |row| row.status.word().into()),
-        ("score", true, |row| row.score.into()),
+        ("status", all, |row| row.status.word().into()),
+        ("score", all, |row| row.score.into()),
         ("weight", weighted, |row| row.weight.into()),
-        ("trace_hash", true, |row| row.trace_hash.as_str().into()),
+        ("trace_hash", all, |row| row.trace_hash.as_str().into()),
     ];
     let shown: Vec<_> = columns.into_iter().filter(|(_, shown, _)| *shown).collect();
     let mut table = Table::new(shown.iter().map(|(name, ..)| *name)).with_expendable([
         "trace_hash",
         "index",
         "weight",
+        "status",
         "test",
+        "score",
     ]);
+    if args.failed {
+        table.columns.extend(["failed", "why"].map(str::to_owned));
+    }
     table.columns.extend(
         args.property
             .iter()
@@ -146,9 +157,14 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
             .flatten()
             .map(|words| words.as_str().into());
         let contested = any_contested.then(|| contested_in(&row.run));
+        let why = args.failed.then(|| {
+            let names = failed.get(&row.run).map_or("", String::as_str);
+            [names.into(), reason(&history, &row.run).into()]
+        });
         shown
             .iter()
             .map(|(.., cell)| cell(row))
+            .chain(why.into_iter().flatten())
             .chain(words)
             .chain(contested)
             .collect()
@@ -199,16 +215,34 @@ fn outcome(word: &str) -> Result<Outcome, OptionFault> {
         .ok_or_else(|| did_you_mean(word, Outcome::ALL.map(Outcome::word)).into())
 }
 
-/// The outcomes of the named properties by run: one text for each property.
-type OutcomeWords = BTreeMap<String, Vec<String>>;
+/// The first reason why a run failed. Empty if its details can't be read, which other commands
+/// report.
+fn reason(history: &History, run: &str) -> String {
+    let detail = history.newest_run(run).ok();
+    let judgements = detail.iter().flat_map(|run| &run.actions);
+    let failed = judgements
+        .flat_map(|action| &action.judgements)
+        .find(|judgement| judgement.outcome == Outcome::Failed);
+    failed.map_or_else(String::new, |judgement| shortened(&judgement.witness))
+}
 
-/// The runs that the options choose, and the outcomes of the named properties in each: one text for
-/// each property, with the outcomes of all actions that have it.
+/// The runs that the options choose.
+#[derive(Default)]
+struct ChosenRuns {
+    runs: Vec<RunRow>,
+    /// The outcomes of the named properties by run: one text for each property, with the outcomes of
+    /// all actions that have it.
+    words: BTreeMap<String, Vec<String>>,
+    /// The names of the failed properties by run, if only failed runs are wanted.
+    failed: BTreeMap<String, String>,
+}
+
+/// The runs that the options choose.
 fn chosen_runs(
     args: &ListArgs,
     history: &History,
     filter: &RunFilter,
-) -> Result<(Vec<RunRow>, OutcomeWords), Diagnostics> {
+) -> Result<ChosenRuns, Diagnostics> {
     let wanted = args.wanted();
     let by_outcome = wanted.is_some() || !args.property.is_empty();
     let judgements = if by_outcome {
@@ -216,7 +250,7 @@ fn chosen_runs(
     } else {
         Judgements::None
     };
-    let (mut runs, mut words) = (Vec::new(), BTreeMap::new());
+    let mut chosen = ChosenRuns::default();
     let mut judged: BTreeSet<Arc<str>> = BTreeSet::new();
     history.each_judged(
         filter,
@@ -252,16 +286,25 @@ fn chosen_runs(
                     .join(", ")
             };
             if !args.property.is_empty() {
-                words.insert(
+                chosen.words.insert(
                     run.row.run.clone(),
                     args.property.iter().map(outcomes).collect(),
                 );
             }
-            runs.push(run.row);
+            if args.failed {
+                let of_run = run.outcomes.iter();
+                let mut names: Vec<&str> = of_run
+                    .filter(|own| own.outcome == Outcome::Failed)
+                    .map(|own| names::local(&own.property))
+                    .collect();
+                names.dedup();
+                chosen.failed.insert(run.row.run.clone(), names.join(", "));
+            }
+            chosen.runs.push(run.row);
         },
     )?;
     if by_outcome {
         chosen::all_judged(&args.property, judged.iter().map(|property| &**property))?;
     }
-    Ok((runs, words))
+    Ok(chosen)
 }

@@ -42,11 +42,41 @@ pub fn answer_cells<'a>(
         .collect()
 }
 
+/// Number of significant digits of numbers in tables for people.
+const DIGITS: usize = 6;
+
+/// A number with [`DIGITS`] significant digits at most.
+fn rounded(value: f64) -> String {
+    let text = value.to_string();
+    if text.len() <= DIGITS || !value.is_finite() || value == 0.0 {
+        return text;
+    }
+    let magnitude = value.abs().log10().floor();
+    if !(-4.0..9.0).contains(&magnitude) {
+        return format!("{value:.*e}", DIGITS - 1);
+    }
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "between 0 and 10"
+    )]
+    let decimals = (DIGITS as f64 - 1.0 - magnitude).max(0.0) as usize;
+    let text = format!("{value:.decimals$}");
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
+}
+
 fn value(term: &Term, format: TableFormat) -> Value {
     match term {
         Term::Iri(iri) if format == TableFormat::Table => names::shorten(iri).into(),
         Term::Iri(iri) => iri.as_ref().into(),
         Term::Blank(label) => format!("_:{label}").into(),
+        Term::Double(value) if format == TableFormat::Table => rounded(*value).into(),
+        Term::Decimal(text) if format == TableFormat::Table && text.len() > DIGITS => text
+            .parse()
+            .map_or_else(|_| text.as_ref().into(), |value: f64| rounded(value).into()),
         Term::Decimal(text) if format == TableFormat::Json => number(text),
         Term::Literal(text, datatype) if format == TableFormat::Json && is_number(datatype) => {
             number(text)

@@ -19,7 +19,7 @@ pub(super) fn shade(rate: f64) -> char {
 
 /// Writes the collisions of each action: the things that were hit, how often, how hard, and where
 /// they were.
-pub(super) fn collisions(out: &mut String, all: &[Collisions], page: Page) {
+pub(super) fn collisions(out: &mut String, all: &[Collisions], (figures, page): (bool, Page)) {
     let hit = || all.iter().filter(|of| of.hit > 0);
     if hit().next().is_none() {
         return;
@@ -36,7 +36,9 @@ pub(super) fn collisions(out: &mut String, all: &[Collisions], page: Page) {
             of.executions
         );
         kinds(out, of, page);
-        places(out, of, page);
+        if figures {
+            places(out, of, page);
+        }
     }
 }
 

@@ -8,7 +8,8 @@ const SHOWN_UNITS = { m: [100, "cm"], rad: [180 / Math.PI, "°"], N: [1, "N"] };
 /** `5 cm`, `60.8 cm` */
 function inUnit(value, unit) {
   const [factor, name] = SHOWN_UNITS[unit] ?? [1, unit], shown = value * factor;
-  return `${number(Number(shown.toFixed(Math.abs(shown) < 99.95 ? 1 : 0)))}${THIN}${name}`;
+  const rounded = unit in SHOWN_UNITS ? shown.toFixed(Math.abs(shown) < 99.95 ? 1 : 0) : shown.toPrecision(3);
+  return number(Number(rounded), name);
 }
 
 /** The signals of a run: name, unit, and its value at each frame (NaN: unknown). */
