@@ -79,6 +79,8 @@ mod ontology;
 mod oracle;
 mod other_stores;
 mod pads;
+mod page;
+mod served_page;
 mod patterns;
 mod perceive;
 mod physics;

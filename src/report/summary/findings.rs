@@ -195,23 +195,29 @@ pub(crate) fn percent(share: f64) -> String {
     }
 }
 
+/// The name of a column's quantity in sentences, on axes and in lists, such as
+/// `drawn error of target xy`.
+pub(crate) fn quantity_name(column: &str, unit: Option<&str>) -> String {
+    let bare = without_unit(column, unit);
+    match bare.strip_prefix(DRAWN) {
+        Some(of) => format!("drawn error of {}", of.replace('_', " ")),
+        None => bare.replace('_', " "),
+    }
+}
+
+fn without_unit<'a>(column: &'a str, unit: Option<&str>) -> &'a str {
+    unit.and_then(|unit| column.strip_suffix(&format!("_{}", unit.to_lowercase())))
+        .unwrap_or(column)
+}
+
 /// Describes a condition, such as `target friction < 0.35`.
 fn condition_text(condition: &Condition, parameter: &Parameter) -> String {
     let unit = parameter
         .unit
         .as_ref()
         .map_or_else(String::new, |unit| format!(" {unit}"));
-    let bare = match &parameter.unit {
-        Some(unit) => parameter
-            .name
-            .strip_suffix(&format!("_{}", unit.to_lowercase()))
-            .unwrap_or(&parameter.name),
-        None => &parameter.name,
-    };
-    let name = match bare.strip_prefix(DRAWN) {
-        Some(of) => format!("drawn error of {}", of.replace('_', " ")),
-        None => bare.replace('_', " "),
-    };
+    let bare = without_unit(&parameter.name, parameter.unit.as_deref());
+    let name = quantity_name(&parameter.name, parameter.unit.as_deref());
     match condition {
         Condition::Kind { kind, .. } => {
             let thing = bare

@@ -27,7 +27,7 @@ pub use case::CaseSummary;
 pub use compare::{CompareSummary, ComparedSide, SideChange};
 pub(crate) use compare::{compared_name, compared_parts};
 pub use engines::EngineSummary;
-pub(crate) use findings::percent;
+pub(crate) use findings::{percent, quantity_name};
 pub use findings::{Causes, FindingsSummary, PropertyReport};
 pub use health::HealthSummary;
 pub(crate) use labels::label_word;

@@ -164,7 +164,7 @@ function axes(pen, runs, x, y, equal, width, height, box, outlines) {
       pen.fillText(number(value), along ? px(value) : inner.left - 6, along ? inner.top + inner.height + 15 : py(value) + 4);
     }
   }
-  const named = ({ name, unit }) => `${name.replace(/_(m|rad|kg)$/, "").replaceAll("_", " ")}${unit && unit !== "1" ? ` (${unit})` : ""}`;
+  const named = ({ label, unit }) => `${label}${unit && unit !== "1" ? ` (${unit})` : ""}`;
   pen.textAlign = "center";
   pen.fillText(`${named(xs)} →`, inner.left + inner.width / 2, height - 8);
   pen.save();
