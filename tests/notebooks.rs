@@ -87,7 +87,10 @@ fn every_notebook_names_the_packages_that_it_imports() {
         for package in ["polars", "matplotlib", "pyoxigraph"] {
             let is_named = first.contains(package) || first.contains("requirements");
             let is_used = imports.contains(&format!("import {package}"));
-            assert!(is_named || !is_used || name == "judge_robosuite.ipynb", "{name}: {package}");
+            assert!(
+                is_named || !is_used || name == "judge_robosuite.ipynb",
+                "{name}: {package}"
+            );
         }
     }
 }

@@ -58,7 +58,12 @@ fn bars_have_one_scale() {
             const [bar, fill] = [it, it.querySelector('.fill')].map((one) => one.getBoundingClientRect().width); \
             return Math.abs(100 * fill / bar - told); })";
         let off = browser.value(off);
-        let off: Vec<f64> = off.as_array().unwrap().iter().filter_map(Value::as_f64).collect();
+        let off: Vec<f64> = off
+            .as_array()
+            .unwrap()
+            .iter()
+            .filter_map(Value::as_f64)
+            .collect();
         assert!(off.iter().all(|off| *off < 1.0), "{view}: {off:?}");
         assert!(!off.is_empty() || view == "/patterns", "{view}");
     }
@@ -77,7 +82,10 @@ fn the_search_finds_every_object_of_a_run() {
     assert!(found.status.success(), "{}", stderr(&found));
     let mut models = std::collections::BTreeMap::<String, u64>::new();
     for line in stdout(&found).lines().skip(1) {
-        let model = line.rsplit(['/', ',', '"']).find(|part| !part.is_empty()).unwrap();
+        let model = line
+            .rsplit(['/', ',', '"'])
+            .find(|part| !part.is_empty())
+            .unwrap();
         *models.entry(model.to_owned()).or_default() += 1;
     }
     assert!(models.len() > 3, "{models:?}");
@@ -85,7 +93,8 @@ fn the_search_finds_every_object_of_a_run() {
     for (model, runs) in models {
         browser.open(&file, &format!("/runs?q={model}"));
         browser.until("document.querySelector('.told')?.textContent");
-        let told = browser.value("Number(document.querySelector('.told').textContent.split(' ')[0])");
+        let told =
+            browser.value("Number(document.querySelector('.told').textContent.split(' ')[0])");
         assert!(told.as_u64().unwrap() >= runs, "{model}: {told} of {runs}");
     }
 }
@@ -97,11 +106,13 @@ fn the_list_tells_the_cause() {
     let (mut browser, file) = opened(project.path());
     browser.open(&file, "/runs?outcome=failed");
     browser.until("document.querySelector('.rows .row')");
-    let told = browser.value(
-        "[...document.querySelectorAll('.rows .words')].map((it) => it.textContent)",
-    );
+    let told =
+        browser.value("[...document.querySelectorAll('.rows .words')].map((it) => it.textContent)");
     for words in told.as_array().unwrap().iter().filter_map(Value::as_str) {
-        assert!(words.starts_with("perceived ") && words.contains(" cm "), "{words}");
+        assert!(
+            words.starts_with("perceived ") && words.contains(" cm "),
+            "{words}"
+        );
         assert!(words.contains("the fingers did not close on"), "{words}");
     }
 }
@@ -112,12 +123,21 @@ fn a_replay_opens_when_the_hand_closes() {
     let project = shipped("pick").copied();
     let (mut browser, file) = opened(project.path());
     watched(&mut browser, &file);
-    let opened = number(&mut browser, "Number(document.querySelector('.slider').value)");
+    let opened = number(
+        &mut browser,
+        "Number(document.querySelector('.slider').value)",
+    );
     let closes = "unpack('replay-0').then(({ actions: [pick] }) => pick.phases.find(([name]) => name === 'close')[1])";
     let closes = number(&mut browser, closes);
-    assert!((opened - closes).abs() < 2.0, "opened at {opened} s, but the hand closes at {closes} s");
+    assert!(
+        (opened - closes).abs() < 2.0,
+        "opened at {opened} s, but the hand closes at {closes} s"
+    );
     let words = browser.value("document.querySelector('.failure button').textContent");
-    assert!(words.as_str().unwrap().starts_with("the hand closes ("), "{words}");
+    assert!(
+        words.as_str().unwrap().starts_with("the hand closes ("),
+        "{words}"
+    );
 }
 
 /// Names contained U+200B, so that a copied name was found nowhere.
@@ -126,7 +146,14 @@ fn names_are_plain_text() {
     let project = shipped("pick").copied();
     let (mut browser, file) = opened(project.path());
     let run = format!("/run/{}", watched(&mut browser, &file));
-    for view in ["/", "/modes", "/properties", "/history", "/runs", run.as_str()] {
+    for view in [
+        "/",
+        "/modes",
+        "/properties",
+        "/history",
+        "/runs",
+        run.as_str(),
+    ] {
         browser.open(&file, view);
         browser.until("document.querySelector('main h1')");
         let odd = browser.value("/[\\u200b\\u00ad\\u2060]/.test(document.body.textContent)");
@@ -152,22 +179,27 @@ fn keys_play_and_step_and_views_change_the_picture() {
     browser.until(playing);
     browser.press(" ");
     browser.until(&format!("!({playing})"));
-    let speeds = browser.value(
-        "[...document.querySelector('[aria-label=Speed]').options].map((it) => it.value)",
-    );
+    let speeds = browser
+        .value("[...document.querySelector('[aria-label=Speed]').options].map((it) => it.value)");
     assert_eq!(speeds, json!(["0.25", "0.5", "1", "2", "4", "8"]));
     // With the player in focus, further keys work.
     browser.value("document.querySelector('.stage').focus()");
     browser.press("ArrowUp");
-    assert_eq!(browser.value("document.querySelector('[aria-label=Speed]').value"), json!("2"));
+    assert_eq!(
+        browser.value("document.querySelector('[aria-label=Speed]').value"),
+        json!("2")
+    );
     browser.press("Home");
     assert_eq!(number(&mut browser, secs), 0.0);
 
-    let looks = browser.value("[...document.querySelectorAll('[data-look]')].map((it) => it.dataset.look)");
+    let looks =
+        browser.value("[...document.querySelectorAll('[data-look]')].map((it) => it.dataset.look)");
     assert_eq!(looks, json!(["side", "top", "hand", "camera"]));
     let mut seen = Vec::new();
     for look in ["side", "top", "hand", "camera"] {
-        browser.value(&format!("document.querySelector('[data-look={look}]').click()"));
+        browser.value(&format!(
+            "document.querySelector('[data-look={look}]').click()"
+        ));
         assert_eq!(
             browser.value("document.querySelector('[aria-pressed=true]').dataset.look"),
             json!(look)
@@ -182,9 +214,13 @@ fn keys_play_and_step_and_views_change_the_picture() {
         browser.value("[document.querySelector('[aria-pressed=true]').dataset.look, document.querySelector('[aria-label=Speed]').value]"),
         json!(["side", "1"])
     );
-    let commands = browser.value("[...document.querySelectorAll('.repeats code')].map((it) => it.textContent)");
+    let commands = browser
+        .value("[...document.querySelectorAll('.repeats code')].map((it) => it.textContent)");
     let replay = commands[0].as_str().unwrap();
-    assert!(replay.ends_with(&format!(" replay {id} --history h")), "{commands}");
+    assert!(
+        replay.ends_with(&format!(" replay {id} --history h")),
+        "{commands}"
+    );
     assert!(browser.complaints.is_empty(), "{:#?}", browser.complaints);
 }
 
@@ -196,24 +232,43 @@ fn tables_are_sorted_by_their_heads() {
     let column = "[...document.querySelectorAll('.properties tbody tr')].map((row) => Number(row.cells[2].textContent))";
     let state = "document.querySelectorAll('.properties thead th')[2].getAttribute('aria-sort')";
     let first = browser.value(column);
-    let mut sorted: Vec<f64> = first.as_array().unwrap().iter().filter_map(Value::as_f64).collect();
+    let mut sorted: Vec<f64> = first
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(Value::as_f64)
+        .collect();
     sorted.sort_by(f64::total_cmp);
     browser.value("document.querySelectorAll('.properties thead button')[2].click()");
     assert_eq!(browser.value(state), json!("ascending"));
-    assert_eq!(json!(sorted.iter().map(|value| *value as u64).collect::<Vec<_>>()), browser.value(column));
+    assert_eq!(
+        json!(sorted.iter().map(|value| *value as u64).collect::<Vec<_>>()),
+        browser.value(column)
+    );
     browser.value("document.querySelectorAll('.properties thead button')[2].click()");
     sorted.reverse();
     assert_eq!(browser.value(state), json!("descending"));
-    assert_eq!(json!(sorted.iter().map(|value| *value as u64).collect::<Vec<_>>()), browser.value(column));
+    assert_eq!(
+        json!(sorted.iter().map(|value| *value as u64).collect::<Vec<_>>()),
+        browser.value(column)
+    );
     browser.value("document.querySelectorAll('.properties thead button')[2].click()");
-    assert_eq!((browser.value(state), browser.value(column)), (Value::Null, first));
+    assert_eq!(
+        (browser.value(state), browser.value(column)),
+        (Value::Null, first)
+    );
 
     browser.open(&file, "/runs");
     browser.until("document.querySelector('.rows .row')");
     browser.value("document.querySelector('.list .head .score button').click()");
     let scores = "[...document.querySelectorAll('.rows .row')].sort((a, b) => a.ariaRowIndex - b.ariaRowIndex).map((row) => Number(row.querySelector('.score').textContent))";
     let scores = browser.value(scores);
-    let scores: Vec<f64> = scores.as_array().unwrap().iter().filter_map(Value::as_f64).collect();
+    let scores: Vec<f64> = scores
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(Value::as_f64)
+        .collect();
     assert!(scores.is_sorted(), "{scores:?}");
     assert_eq!(browser.value("location.hash"), json!("#/runs?sort=score"));
     let heads = "document.querySelector('.list [aria-sort]').className + ' ' + document.querySelector('.list [aria-sort]').ariaSort";
@@ -231,12 +286,16 @@ fn nothing_is_beyond_the_edge_of_a_narrow_screen() {
     let beyond = "[...document.querySelectorAll('.rows .words, .top nav a, .top .whence')].filter((it) => { \
         const { left, right } = it.getBoundingClientRect(); return left < 0 || right > innerWidth + 1; }).map((it) => it.textContent)";
     assert_eq!(browser.value(beyond), json!([]));
-    let room = number(&mut browser, "document.querySelector('.rows .words').getBoundingClientRect().width");
+    let room = number(
+        &mut browser,
+        "document.querySelector('.rows .words').getBoundingClientRect().width",
+    );
     assert!(room > 300.0, "{room}");
     browser.open(&file, "/");
     assert_eq!(browser.value(beyond), json!([]));
     // A table that scrolls shows it by a shadow.
-    let shadow = browser.value("getComputedStyle(document.querySelector('.scroll')).backgroundImage");
+    let shadow =
+        browser.value("getComputedStyle(document.querySelector('.scroll')).backgroundImage");
     assert!(shadow.as_str().unwrap().contains("gradient"), "{shadow}");
 }
 
@@ -248,11 +307,14 @@ fn two_runs_are_played_side_by_side() {
     let id = watched(&mut browser, &file);
     browser.value("[...document.querySelectorAll('.runhead a')].find((it) => it.textContent === 'side by side').click()");
     browser.until("document.querySelectorAll('.player.pair .stage').length === 2 && document.querySelector('.watch').dataset.ready");
-    let names = browser.value("[...document.querySelectorAll('.side h2')].map((it) => it.textContent)");
+    let names =
+        browser.value("[...document.querySelectorAll('.side h2')].map((it) => it.textContent)");
     assert_eq!(names[0], json!(format!("{id}: failed")));
     assert!(names[1].as_str().unwrap().ends_with(": passed"), "{names}");
     browser.value("(() => { const it = document.querySelector('.slider'); it.value = 1; it.dispatchEvent(new Event('input')); })()");
-    let cursors = browser.value("[...document.querySelectorAll('.timeline .now')].map((it) => it.getAttribute('x1') > 0)");
+    let cursors = browser.value(
+        "[...document.querySelectorAll('.timeline .now')].map((it) => it.getAttribute('x1') > 0)",
+    );
     assert_eq!(cursors, json!([true, true]));
     let differing = browser.value("document.querySelectorAll('.both tr.strong').length");
     assert!(differing.as_u64().unwrap() > 0);

@@ -241,7 +241,9 @@ fn numbers_beside_a_limit_are_rounded_away_from_it() {
             let words = ["(limit", "limit: \"", "needs ", "(minimum"];
             rule.contains("?text = ") && words.iter().any(|word| rule.contains(word))
         });
-        for rule in of_limits.filter(|rule| rule.contains("STR(ROUND") || rule.contains("STR(CEIL") || rule.contains("STR(FLOOR")) {
+        for rule in of_limits.filter(|rule| {
+            rule.contains("STR(ROUND") || rule.contains("STR(CEIL") || rule.contains("STR(FLOOR")
+        }) {
             let is_away = rule.contains("STR(CEIL(") || rule.contains("STR(FLOOR(");
             assert!(is_away, "{}: {rule}", path.display());
             checked += 1;

@@ -10,15 +10,22 @@ use crate::support::server::Server;
 use crate::support::shipped;
 
 /// The runs of the list.
-const RUNS: &str = "Number((document.querySelector('.told')?.textContent ?? '0').split(' of ')[1]?.split(' ')[0])";
+const RUNS: &str =
+    "Number((document.querySelector('.told')?.textContent ?? '0').split(' of ')[1]?.split(' ')[0])";
 
 #[test]
 fn the_report_its_data_and_replays_are_served() {
     let project = shipped("pick").copied();
     let server = Server::start(&project.path().join("h"), &[]);
     let page = server.get("/");
-    assert_eq!((page.status, page.media_type()), (200, "text/html; charset=utf-8"));
-    assert!(page.body.contains("connect-src 'self'"), "the page may ask its server");
+    assert_eq!(
+        (page.status, page.media_type()),
+        (200, "text/html; charset=utf-8")
+    );
+    assert!(
+        page.body.contains("connect-src 'self'"),
+        "the page may ask its server"
+    );
     let first = server.get("/data");
     let data: Value = serde_json::from_str(&first.body).unwrap();
     assert!(data["summary"].is_string() && data["runs"].is_string());
@@ -33,7 +40,12 @@ fn the_report_its_data_and_replays_are_served() {
     let runs: Value = serde_json::from_str(&crate::support::stdout(&list)).unwrap();
     let run = runs[0]["run"].as_str().unwrap();
     let replay = server.get(&format!("/replay?run={run}"));
-    assert_eq!((replay.status, replay.media_type()), (200, "application/json"), "{}", replay.body);
+    assert_eq!(
+        (replay.status, replay.media_type()),
+        (200, "application/json"),
+        "{}",
+        replay.body
+    );
     let parts: Value = serde_json::from_str(&replay.body).unwrap();
     assert!(parts["forms"].is_string() && parts["replay"].is_string());
     for (target, status) in [
@@ -45,7 +57,11 @@ fn the_report_its_data_and_replays_are_served() {
         assert_eq!(server.get(target).status, status, "{target}");
     }
     for target in ["/data", "/replay", "/query"] {
-        assert_eq!(server.request("POST", target, &[], b"x").status, 405, "{target}");
+        assert_eq!(
+            server.request("POST", target, &[], b"x").status,
+            405,
+            "{target}"
+        );
     }
 }
 
@@ -60,10 +76,23 @@ fn a_served_report_follows_a_campaign_and_replays_every_run() {
     browser.until("document.documentElement?.dataset.ready");
     let before = browser.value(RUNS).as_u64().unwrap();
     let playable = "document.querySelectorAll('.rows .can').length";
-    assert_eq!(browser.value(playable), json!(before), "every run can be played");
+    assert_eq!(
+        browser.value(playable),
+        json!(before),
+        "every run can be played"
+    );
 
     let ran = Command::new(env!("CARGO_BIN_EXE_actcheck"))
-        .args(["run", "configs/pick.toml", "--runs", "2", "--seed", "77", "--history", "h"])
+        .args([
+            "run",
+            "configs/pick.toml",
+            "--runs",
+            "2",
+            "--seed",
+            "77",
+            "--history",
+            "h",
+        ])
         .current_dir(project.path())
         .output()
         .unwrap();

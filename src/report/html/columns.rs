@@ -12,7 +12,7 @@ use actcheck_analysis::{ColumnKind, OutcomeTable, PerceptionError, columns};
 use actcheck_base::{Outcome, names};
 
 /// Columns that a page needs in addition to those of the findings.
-pub const HTML_COLUMNS: [&str; 14] = [
+pub const HTML_COLUMNS: [&str; 11] = [
     "index",
     "repetition",
     "test",
@@ -24,9 +24,6 @@ pub const HTML_COLUMNS: [&str; 14] = [
     "others_displacement_m",
     "reported",
     "objects",
-    "target_perceived_ahead_m",
-    "target_perceived_left_m",
-    "target_perceived_above_m",
 ];
 
 /// Code for a property that a run does not have.
