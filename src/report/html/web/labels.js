@@ -27,12 +27,12 @@ class Labels {
   }
 
   /**
-   * Adds a label. `at` returns its place at a moment, or `null`; labels added first are more important. A label with `off`
-   * is beside its place, and outside the box with the corners that `off` returns at a moment.
+   * Adds a label. `at` returns its place at a moment, or `null`; labels added first are more important. `own` returns the
+   * corners of the box around its thing, which it does not cover. `isMark`: it belongs to a star at its place.
    */
-  add(kind, words, at, off) {
+  add(kind, words, at, own = () => null, isMark = false) {
     const element = make("span", { class: `label ${kind}` }, words);
-    this.items.push({ element, at, off });
+    this.items.push({ element, at, own, isMark });
     this.element.append(element);
     return element;
   }
@@ -50,13 +50,15 @@ class Labels {
     const taken = [], things = this.things.flatMap((corners) => around(corners(secs)));
     const clash = (box, others) => others.find((other) => box.left < other.right && box.right > other.left && box.top < other.bottom && box.bottom > other.top);
     this.crowded = 0;
-    for (const { element, at, off } of this.items) {
+    for (const { element, at, own, isMark } of this.items) {
       const point = at(secs), seen = point && project(point);
       element.hidden = !seen?.isInside;
       if (element.hidden) continue;
       const [wide, tall] = [element.offsetWidth, element.offsetHeight];
-      const box = off ? beside(seen, wide, tall, [...taken, ...things], around(off(secs) ?? []), { width, height, clash })
-        : above(seen, wide, tall, [...taken, ...things], { width, clash });
+      const [thing] = around(own(secs) ?? []), isFurniture = element.classList.contains("furniture");
+      const box = isMark ? besideStar(seen, wide, tall, [...taken, ...things], thing ? [thing] : [], { width, height, clash })
+        : (thing && around4(thing, wide, tall, { width, height }).find((one) => !clash(one, [...taken, ...things])))
+          ?? above(seen, wide, tall, isFurniture ? [...taken, ...things] : taken, { width, clash });
       element.hidden = !box;
       if (!box) {
         this.crowded++;
@@ -67,6 +69,14 @@ class Labels {
     }
     this.counted();
   }
+}
+
+/** Boxes of a label around its thing: above, right, left and below it. */
+function around4(thing, wide, tall, { width, height }) {
+  const middle = (thing.left + thing.right - wide) / 2, upper = thing.top + LABEL_GAP;
+  return [[middle, thing.top - tall - LABEL_GAP], [thing.right + LABEL_GAP, upper], [thing.left - wide - LABEL_GAP, upper], [middle, thing.bottom + LABEL_GAP]]
+    .map(([left, top]) => ({ left, right: left + wide, top, bottom: top + tall }))
+    .filter(({ left, right, top, bottom }) => left >= 4 && top >= 4 && right <= width - 4 && bottom <= height - 4);
 }
 
 /** The box of a label above its place, moved up off all others; `null` if there is no room. */
@@ -80,8 +90,8 @@ function above(seen, wide, tall, others, { width, clash }) {
   return null;
 }
 
-/** The box of a label beside its place, off all others and outside its own thing; if that fills the picture, only off all others. */
-function beside(seen, wide, tall, others, own, { width, height, clash }) {
+/** The box of a label beside the star at its place, off all others and outside its own thing; if that fills the picture, only off all others. */
+function besideStar(seen, wide, tall, others, own, { width, height, clash }) {
   const star = { left: seen.x - STAR_PX, right: seen.x + STAR_PX, top: seen.y - STAR_PX, bottom: seen.y + STAR_PX };
   const tried = BESIDE_PX.flatMap((away) => BESIDE.map(([x, y]) => {
     const left = seen.x + x * (STAR_PX + away) - (x < 0 ? wide : x > 0 ? 0 : wide / 2), top = seen.y + y * (STAR_PX + away) - (y < 0 ? tall : y > 0 ? 0 : tall / 2);

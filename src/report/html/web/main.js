@@ -64,6 +64,8 @@ async function main() {
     const go = (first, again = false) => {
       const opened = wayOf(location.hash), { way } = opened;
       address.opened(opened);
+      // The view that is shown has older runs than the filter.
+      if (again) filter.listeners.delete(shown.follow);
       if (FILTERED.has(way[0])) filter.set(filter.ofQuery(opened.query));
       // A step back or forward within a view.
       if (!first && !again && shown.key === way.join("/")) return shown.arrive?.(opened.query);

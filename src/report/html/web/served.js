@@ -37,20 +37,16 @@ function keepLive(report, redraw) {
   let state = "";
   const told = document.querySelector(".live");
   const tell = (word) => { told.textContent = ` · ${word}`; };
+  const asked = async () => {
+    const answer = await fetch(`/data?state=${encodeURIComponent(state)}`);
+    return { isRead: answer.ok, data: answer.status === 200 ? await answer.json() : null };
+  };
   const ask = async () => {
-    try {
-      if (!document.hidden) {
-        const answer = await fetch(`/data?state=${encodeURIComponent(state)}`);
-        if (answer.status === 200) {
-          const data = await answer.json();
-          if (state || data.runs !== document.getElementById("data-runs").textContent) await take(report, data, redraw);
-          state = data.state;
-        }
-        if (answer.ok) tell(progress(report.summary));
-        else tell("the history can't be read at present");
-      }
-    } catch {
-      tell("no response from the server");
+    if (!document.hidden) {
+      const { isRead, data } = await asked().catch(() => ({ isRead: false, data: null }));
+      if (data && (state || data.runs !== document.getElementById("data-runs").textContent)) await take(report, data, redraw);
+      state = data?.state ?? state;
+      tell(isRead ? progress(report.summary) : "the server does not answer, or can't read the history at present");
     }
     setTimeout(ask, ASK_EVERY);
   };
@@ -71,7 +67,9 @@ async function take(report, { summary, runs }, redraw) {
   report.summary = newSummary;
   report.runs = filter.runs = new Runs(columns, newSummary);
   filter.sets = patternSets(newSummary.findings);
-  filter.set(filter.ofQuery(query));
+  // The view that is shown has the old runs: it is drawn anew instead of following the filter.
+  Object.assign(filter, filter.ofQuery(query));
+  filter.shown = filter.chosen();
   gatherLetters(report.runs);
   if (WATCHED.has(wayOf(location.hash).way[0])) return;
   redraw();

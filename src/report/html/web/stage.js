@@ -6,8 +6,11 @@ const AROUND_M = 0.3;
 const BESIDE_SECS = 0.5;
 /** Things further than this from the centre of the view have no label. Unit: metres. */
 const LABELLED_M = 1.5;
-/** Width of the star at a contact. Unit: metres. */
-const STAR_M = 0.19;
+/** Width of the star at a contact, at any distance: as wide as this at 1 m. Unit: metres. */
+const STAR_M = 0.08;
+/** Vertical angle of the picture, and of that of the robot's camera. Unit: degrees. */
+const VIEW_DEG = 38;
+const CAMERA_DEG = 44;
 /** Angle between the camera's direction and the robot's reach. Unit: radians. */
 const ASIDE = 1.95;
 
@@ -22,7 +25,7 @@ class Stage {
     this.renderer.shadowMap.type = three.PCFShadowMap;
     this.renderer.toneMapping = three.ACESFilmicToneMapping;
     this.scene = new three.Scene();
-    this.camera = new three.PerspectiveCamera(38, 1, 0.02, 60);
+    this.camera = new three.PerspectiveCamera(VIEW_DEG, 1, 0.02, 60);
     this.camera.up.set(0, 0, 1);
     this.lights();
     this.labels = new Labels();
@@ -92,18 +95,17 @@ class Stage {
       const still = replay.still.find(({ name }) => name === pressed.thing), track = course.slot.get(pressed.thing);
       const form = forms[(still ?? course.tracks[track])?.form], corners = form && cornersOf(form);
       const pose = (secs) => still?.at ?? course.pose(track, secs);
-      this.tag = labels.add("pressed", pressed.label, () => pressed.at, (secs) => corners && corners.map((corner) => placed(pose(secs), corner)));
+      this.tag = labels.add("pressed", pressed.label, () => pressed.at, (secs) => corners && corners.map((corner) => placed(pose(secs), corner)), true);
     }
     this.told = labels.add("gap", "", () => this.middle);
+    const corners = new Map(course.tracks.map((track, slot) => [slot, track.name.startsWith("robot/") ? [] : cornersOf(forms[track.form])]));
+    const cornersAt = (slot) => (secs) => { const pose = course.pose(slot, secs); return corners.get(slot).map((corner) => placed(pose, corner)); };
     const body = (track, slot) => labels.add(track.role === "target" ? "target" : "other", track.name, (secs) => {
       const [x, y, z] = course.position(track.name, secs);
       return near([x, y, z + above(forms[course.tracks[slot].form])]);
-    });
+    }, cornersAt(slot));
     const things = course.tracks.map((track, slot) => [track, slot]).filter(([track]) => !track.name.startsWith("robot/"));
-    things.forEach(([track, slot]) => {
-      const corners = cornersOf(forms[track.form]);
-      labels.spare((secs) => { const pose = course.pose(slot, secs); return corners.map((corner) => placed(pose, corner)); });
-    });
+    things.forEach(([, slot]) => labels.spare(cornersAt(slot)));
     things.filter(([track]) => track.role === "target").forEach(([track, slot]) => body(track, slot));
     if (course.grasp) labels.add("hand", "gripper", (secs) => { const [x, y, z] = course.hand(secs); return [x, y, z + 0.06]; });
     things.filter(([track]) => track.role !== "target").forEach(([track, slot]) => body(track, slot));
@@ -144,7 +146,7 @@ class Stage {
     pen.fill();
     const map = new three.CanvasTexture(picture);
     map.colorSpace = three.SRGBColorSpace;
-    const sprite = new three.Sprite(new three.SpriteMaterial({ map, depthTest: false, transparent: true, toneMapped: false, fog: false }));
+    const sprite = new three.Sprite(new three.SpriteMaterial({ map, depthTest: false, transparent: true, toneMapped: false, fog: false, sizeAttenuation: false }));
     sprite.scale.set(STAR_M, STAR_M, 1);
     sprite.position.set(...at);
     sprite.renderOrder = 1;
@@ -186,7 +188,7 @@ class Stage {
 
   /** The distance from which a sphere fills the picture. */
   away(radius) {
-    const up = this.camera.fov * Math.PI / 360, across = Math.atan(Math.tan(up) * this.camera.aspect);
+    const up = VIEW_DEG * Math.PI / 360, across = Math.atan(Math.tan(up) * this.camera.aspect);
     return radius / Math.sin(Math.min(up, across));
   }
 
@@ -271,7 +273,11 @@ class Stage {
       this.camera.updateProjectionMatrix();
       if (!this.orbit.held) this.orbit.distance = this.away(this.focus(this.secs ?? 0).radius);
     }
-    const eye = this.eye?.(this.secs ?? 0);
+    const eye = this.eye?.(this.secs ?? 0), angle = eye?.angle ?? VIEW_DEG;
+    if (this.camera.fov !== angle) {
+      this.camera.fov = angle;
+      this.camera.updateProjectionMatrix();
+    }
     if (eye) {
       this.camera.up.set(...eye.up);
       this.camera.position.set(...eye.from);

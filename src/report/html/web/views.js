@@ -28,6 +28,6 @@ function sightOf(course, camera) {
   return (secs) => {
     const link = pose(secs), at = (point) => placed(link, placed(camera.pose, point));
     const from = at([0, 0, 0]), top = at([0, 0, 1]);
-    return { from, to: at([1, 0, 0]), up: top.map((value, axis) => value - from[axis]) };
+    return { angle: CAMERA_DEG, from, to: at([1, 0, 0]), up: top.map((value, axis) => value - from[axis]) };
   };
 }
