@@ -1,6 +1,7 @@
 //! All integration tests in one program: the large libraries are linked once.
 
 mod accessible;
+mod advice;
 mod arms_aside;
 mod articulated;
 mod bisect;
