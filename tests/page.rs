@@ -122,13 +122,16 @@ fn the_list_tells_the_cause() {
 fn a_replay_opens_when_the_hand_closes() {
     let project = shipped("pick").copied();
     let (mut browser, file) = opened(project.path());
-    watched(&mut browser, &file);
+    let id = watched(&mut browser, &file);
     let opened = number(
         &mut browser,
         "Number(document.querySelector('.slider').value)",
     );
-    let closes = "unpack('replay-0').then(({ actions: [pick] }) => pick.phases.find(([name]) => name === 'close')[1])";
-    let closes = number(&mut browser, closes);
+    let closes = format!(
+        "(async () => {{ for (let i = 0; ; i++) {{ const {{ run, actions: [pick] }} = await unpack(`replay-${{i}}`); \
+         if (run === '{id}') return pick.phases.find(([name]) => name === 'close')[1]; }} }})()"
+    );
+    let closes = number(&mut browser, &closes);
     assert!(
         (opened - closes).abs() < 2.0,
         "opened at {opened} s, but the hand closes at {closes} s"

@@ -84,7 +84,7 @@ class Filter {
     const replayed = this.replay && !runs.summary.served && new Set([...runs.replayed.keys()].map((id) => runs.find(id)));
     const pattern = this.pattern && new Set(this.sets.get(this.pattern).runs);
     const found = [];
-    for (const run of this.sort === "score" ? runs.byScore() : runs.order) {
+    for (const run of runs.sortedBy(this.sort)) {
       if (outcome >= 0 && (slot >= 0 ? runs.outcome(run, slot) : runs.worst[run]) !== outcome) continue;
       if (slot >= 0 && runs.outcome(run, slot) === NO_OUTCOME) continue;
       if (mode >= 0 && runs.mode[run] !== mode + 1) continue;

@@ -7,7 +7,12 @@ function pairView(report, left, right) {
   const { runs, address, to } = report;
   const first = runs.find(left), second = right === undefined ? otherOf(runs, first) : runs.find(right);
   const choose = (words, id, change) => {
-    const input = make("input", { type: "search", list: "runs-offered", value: id, "aria-label": `${words} run`, onchange: () => runs.find(input.value) !== undefined && (location.hash = change(input.value)) });
+    const input = make("input", { type: "search", list: "runs-offered", value: id, "aria-label": `${words} run`, onchange: () => {
+      const isKnown = runs.find(input.value) !== undefined;
+      input.setCustomValidity(isKnown ? "" : "This report has no such run.");
+      if (isKnown) location.hash = change(input.value);
+      else input.reportValidity();
+    } });
     return make("label", {}, `${words} `, input);
   };
   const offered = Array.from(runs.order).filter((run) => runs.canPlay(runs.id(run))).slice(0, MOST_OFFERED);

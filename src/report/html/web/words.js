@@ -20,15 +20,22 @@ function counted(value, noun) {
   return `${count(value)} ${noun}${value === 1 ? "" : "s"}`;
 }
 
+/** A share, as the program prints it: halves are rounded to even numbers. */
 function percent(share) {
   const value = share * 100;
-  return `${value > 0 && value < 9.95 ? value.toFixed(1) : value.toFixed(0)}${THIN}%`;
+  return `${value > 0 && value < 9.95 ? value.toFixed(1) : whole(value)}${THIN}%`;
+}
+
+/** The nearest whole number, of two the even one. */
+function whole(value) {
+  const near = Math.round(value);
+  return Math.abs(value - Math.trunc(value)) === 0.5 && near % 2 !== 0 ? near - 1 : near;
 }
 
 /** `71 % [58–82]` */
 function interval(found) {
   if (!found) return "–";
-  return `${percent(found.rate)} [${(found.low * 100).toFixed(0)}–${(found.high * 100).toFixed(0)}]`;
+  return `${percent(found.rate)} [${whole(found.low * 100)}–${whole(found.high * 100)}]`;
 }
 
 /** The 95 % Wilson score interval (1927), as everywhere in actcheck. */
