@@ -222,13 +222,14 @@ fn axe_core_finds_nothing_on_the_report_and_the_query_page() {
     let mut browser = opened(project.path());
     let run = failed_run(&mut browser);
     browser.value(&format!("{axe};0"));
-    for view in VIEWS.into_iter().chain([run.as_str()]) {
+    let pair = run.replace("#/run/", "#/pair/");
+    for view in VIEWS.into_iter().chain([run.as_str(), pair.as_str()]) {
         go(&mut browser, view);
         browser.value("document.querySelectorAll('details').forEach((it) => { it.open = true; })");
         no_findings(&mut browser, view);
     }
     let server = Server::start(&project.path().join("h"), &[]);
-    browser.visit(&format!("http://127.0.0.1:{}/", server.port));
+    browser.visit(&format!("http://127.0.0.1:{}/query", server.port));
     browser.until("typeof form !== 'undefined' && document.readyState === 'complete'");
     browser.value("form.requestSubmit()");
     browser.until("document.querySelector('#answer table')");

@@ -1,6 +1,7 @@
 //! All integration tests in one program: the large libraries are linked once.
 
 mod accessible;
+mod advice;
 mod arms_aside;
 mod articulated;
 mod bisect;
@@ -79,6 +80,7 @@ mod ontology;
 mod oracle;
 mod other_stores;
 mod pads;
+mod page;
 mod patterns;
 mod perceive;
 mod physics;
@@ -116,6 +118,7 @@ mod second_judge;
 mod segments;
 mod serve;
 mod serve_load;
+mod served_page;
 mod set_up;
 mod shells;
 mod shortcuts;

@@ -235,7 +235,7 @@ fn completions_list_every_command() {
         }
         assert!(script.contains("until-width"), "{shell} knows no options");
         assert!(
-            !script.contains("serve-query"),
+            !script.contains("serve-query") && !script.contains("serve-report"),
             "{shell} offers a hidden command"
         );
         if foreign::has(shell) {

@@ -314,6 +314,7 @@ fn a_report_with_a_sample_filters_all_runs() {
         replays: &Replays::default(),
         contested: &Default::default(),
         relations: &[],
+        served: false,
     });
     let file = folder.path().join("report.html");
     std::fs::write(&file, page).unwrap();

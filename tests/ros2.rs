@@ -17,7 +17,11 @@ fn with_nodes(mapping: &Path) -> Option<tempfile::TempDir> {
     let folder = project();
     let config = folder.path().join("configs/ros.toml");
     std::fs::copy(folder.path().join("configs/pick.toml"), &config).unwrap();
-    let launcher = format!("{} -m actcheck.ros2 {}", python.display(), mapping.display());
+    let launcher = format!(
+        "{} -m actcheck.ros2 {}",
+        python.display(),
+        mapping.display()
+    );
     edit(
         &config,
         "test_launcher = \"reference\"",
@@ -83,7 +87,10 @@ fn nodes_with_faults_break_their_runs_only() {
     assert_eq!(runs.len(), faults.fault.len());
     for (run, fault) in runs.iter().zip(&faults.fault) {
         let id = run["run"].as_str().unwrap_or_else(|| panic!("{run}"));
-        let shown = actcheck(folder.path(), &["show", id, "--history", "faults", "--format", "json"]);
+        let shown = actcheck(
+            folder.path(),
+            &["show", id, "--history", "faults", "--format", "json"],
+        );
         let shown = stdout(&shown);
         assert_eq!(run["status"], *fault.status, "{}: {shown}", fault.name);
         assert!(shown.contains(&fault.words), "{}: {shown}", fault.name);
@@ -108,10 +115,21 @@ fn an_action_server_picks_and_its_runs_repeat() {
         };
         runs.iter().map(of).collect()
     };
-    let one = hashes(campaign(folder.path(), &["--runs", "2", "--jobs", "1"], "one"));
-    let two = hashes(campaign(folder.path(), &["--runs", "2", "--jobs", "2"], "two"));
+    let one = hashes(campaign(
+        folder.path(),
+        &["--runs", "2", "--jobs", "1"],
+        "one",
+    ));
+    let two = hashes(campaign(
+        folder.path(),
+        &["--runs", "2", "--jobs", "2"],
+        "two",
+    ));
     assert_eq!(one, two);
-    assert!(one.iter().any(|(_, score)| score.as_f64() >= Some(0.8)), "{one:?}");
+    assert!(
+        one.iter().any(|(_, score)| score.as_f64() >= Some(0.8)),
+        "{one:?}"
+    );
 }
 
 /// Three processes with both kinds of executors: timers, services, nested actions, waiting threads.
@@ -132,8 +150,15 @@ fn chains_of_nodes_give_one_trace() {
     }
     let output = command.output().unwrap();
     let said = stdout(&output);
-    assert!(said.contains("4 repetitions, 1 different traces"), "{said}{}", stderr(&output));
-    assert!(said.contains("1 different results, 0 goals did not end"), "{said}");
+    assert!(
+        said.contains("4 repetitions, 1 different traces"),
+        "{said}{}",
+        stderr(&output)
+    );
+    assert!(
+        said.contains("1 different results, 0 goals did not end"),
+        "{said}"
+    );
 }
 
 /// The commands of README, with the environment of these tests in place of a new one.
@@ -155,7 +180,11 @@ fn readmes_commands_test_an_action_server() {
 fn a_mapping_with_faults_is_refused_with_their_lines() {
     let folder = project();
     let file = folder.path().join("skill.toml");
-    std::fs::write(&file, "test_launcher = 3\n[actions.Pick]\nserver = \"/pick\"\n").unwrap();
+    std::fs::write(
+        &file,
+        "test_launcher = 3\n[actions.Pick]\nserver = \"/pick\"\n",
+    )
+    .unwrap();
     let Some(python) = foreign::ros2() else {
         return;
     };
@@ -166,7 +195,10 @@ fn a_mapping_with_faults_is_refused_with_their_lines() {
         .unwrap();
     let said = stderr(&output);
     assert_eq!(output.status.code(), Some(1), "{said}");
-    for words in ["skill.toml:1: `test_launcher`", "skill.toml:2: `actions.Pick.type`"] {
+    for words in [
+        "skill.toml:1: `test_launcher`",
+        "skill.toml:2: `actions.Pick.type`",
+    ] {
         assert!(said.contains(words), "{said}");
     }
 }

@@ -227,6 +227,34 @@ pub fn cases() -> Vec<PathBuf> {
         .collect()
 }
 
+/// "moved 2 cm, needs more than 2 cm": rounding hid the difference.
+#[test]
+fn numbers_beside_a_limit_are_rounded_away_from_it() {
+    let mut checked = 0;
+    for path in ["rules", "rules/lib", "rules/extra", "rules/episodes"]
+        .iter()
+        .flat_map(|folder| list(&root().join("../..").join(folder)))
+        .filter(|path| path.extension().is_some_and(|ending| ending == "rls"))
+    {
+        let text = std::fs::read_to_string(&path).unwrap();
+        let of_limits = text.split(" .\n").filter(|rule| {
+            let words = ["(limit", "limit: \"", "needs ", "(minimum"];
+            rule.contains("?text = ") && words.iter().any(|word| rule.contains(word))
+        });
+        for rule in of_limits.filter(|rule| {
+            rule.contains("STR(ROUND") || rule.contains("STR(CEIL") || rule.contains("STR(FLOOR")
+        }) {
+            // Sizes in tenths of a centimetre show every difference beyond 5 cm.
+            let is_away = rule.contains("?seen, ")
+                || rule.contains("STR(CEIL(")
+                || rule.contains("STR(FLOOR(");
+            assert!(is_away, "{}: {rule}", path.display());
+            checked += 1;
+        }
+    }
+    assert!(checked > 15, "{checked}");
+}
+
 #[test]
 fn every_case_gives_its_expected_findings() {
     assert_expected(

@@ -420,7 +420,7 @@ fn requests_from_other_sites_are_refused() {
 #[test]
 fn the_page_and_the_report_are_served() {
     let server = limited();
-    let page = server.get("/");
+    let page = server.get("/query");
     assert_eq!(
         (page.status, page.media_type()),
         (200, "text/html; charset=utf-8")

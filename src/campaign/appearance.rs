@@ -46,10 +46,17 @@ pub fn appearances(
             .extend(parts.flatten().map(|parts| (name, parts)));
     }
     let of_file = campaign.visuals.robot(found);
-    if of_file.values().any(|seen| seen.has_look)
+    let (has_look, camera) = (
+        of_file.values().any(|seen| seen.has_look),
+        campaign.robot.camera.clone(),
+    );
+    if (has_look || camera.is_some())
         && let Ok(model) = solids::robot_model(&mut campaign)
     {
-        all.links = model.seen(&of_file);
+        all.camera = camera.and_then(|camera| model.camera_place(&camera));
+        if has_look {
+            all.links = model.seen(&of_file);
+        }
     }
     reduce(&mut all);
     Ok(all)

@@ -207,8 +207,8 @@ pub enum Command {
         after_help = "Example:\n  actcheck health    (the newest campaign, after `actcheck run configs/pick.toml`)"
     )]
     Health(crate::health::HealthArgs),
-    /// Serve a history over HTTP: a read-only SPARQL 1.1 endpoint, a query page, and the current
-    /// report
+    /// Serve the report of a history, live while a campaign runs, with the replay of every run, a
+    /// query page and a read-only SPARQL 1.1 endpoint
     ///
     /// Light queries are answered at once. Others wait for a process, which is stopped if it
     /// exceeds its limit of time, memory or answer size. Updates, `SERVICE`, file access and
@@ -356,4 +356,10 @@ pub enum Command {
         after_help = "Example:\n  actcheck serve    (starts this for each query)"
     )]
     ServeQuery(crate::serve::ServeQueryArgs),
+    /// Print the report for `actcheck serve`, or a replay
+    #[command(
+        hide = true,
+        after_help = "Example:\n  actcheck serve    (starts this for the report)"
+    )]
+    ServeReport(crate::serve::ServeReportArgs),
 }

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::options::HistoryArgs;
-use crate::{history_dir, when, why};
+use crate::{history_dir, output, when, why};
 use actcheck_analysis::{Hierarchy, Sampling, TableFilter};
 use actcheck_base::{Diagnostic, Diagnostics, ShellLine, did_you_mean, names};
 use actcheck_history::History;
@@ -115,7 +115,17 @@ impl ChosenRuns {
     /// It can't be read.
     pub(super) fn ontology(&self) -> Result<Ontology, Diagnostics> {
         let (files, path) = why::ontology_file(self.ontology.as_deref());
-        ontology::load(&files, &path)
+        let ontology = ontology::load_to_report(&files, &path)?;
+        // The outcomes are stored: a rule is only needed to explain them.
+        let missing = ontology.warnings.iter();
+        let missing: Diagnostics = missing
+            .filter(|fault| fault.code == "O009")
+            .cloned()
+            .collect();
+        if !missing.is_empty() {
+            output::print_diagnostics(&missing);
+        }
+        Ok(ontology)
     }
 
     /// The options that choose the runs, as they were typed.

@@ -68,6 +68,7 @@ pub fn run(sources_digest: &'static str) -> ExitCode {
         Command::Merge(args) => crate::merge::merge(&args),
         Command::Serve(args) => crate::serve::serve(&args).map(|()| 0),
         Command::ServeQuery(args) => crate::serve::serve_query(&args).map(|()| 0),
+        Command::ServeReport(args) => crate::serve::serve_report(&args).map(|()| 0),
         Command::Show(args) => show::show(&args).map(|()| 0),
         Command::Shrink(args) => shrink::shrink(&args),
         Command::Query(args) => query::query(&args),

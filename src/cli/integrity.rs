@@ -14,8 +14,8 @@ use actcheck_report::Table;
 /// Examines the files of a history and prints the damaged ones. Returns the exit code.
 pub(super) fn examine(args: &HistoryArgs, format: Format) -> Result<u8, Diagnostics> {
     let dir = history_dir::folder(args)?;
-    let (mut found, history) = History::examine(&dir)?;
-    let damaged = Mirror::damage(&history)?;
+    let (mut found, history) = History::examine(&dir).map_err(|faults| advised(faults, &dir))?;
+    let damaged = Mirror::damage(&history).map_err(|faults| advised(faults, &dir))?;
     let reason = "it differs from the runs";
     found.damage.extend(damaged.iter().map(|file| Damage {
         file: file.strip_prefix(&dir).unwrap_or(file).to_path_buf(),
@@ -40,6 +40,27 @@ pub(super) fn examine(args: &HistoryArgs, format: Format) -> Result<u8, Diagnost
         output::print_diagnostics(&fault(&found, damaged.len(), &dir).into());
     }
     Ok(1)
+}
+
+/// Damage because of which a history can't be examined, with advice that does not name this command.
+fn advised(faults: Diagnostics, dir: &Path) -> Diagnostics {
+    let advised = |fault: Diagnostic| match fault.code {
+        "H007" => fault.help(recovery(dir)),
+        _ => fault,
+    };
+    faults.into_iter().map(advised).collect()
+}
+
+/// How the readable data of a damaged history are recovered.
+fn recovery(dir: &Path) -> String {
+    format!(
+        "restore the files from a backup; or `{}` copies all readable data, and \
+             `actcheck run --resume ID --history NEW` makes the lost runs again",
+        ShellLine::default()
+            .fixed("actcheck merge --salvage")
+            .file(dir)
+            .fixed("--into NEW")
+    )
 }
 
 fn mended(files: usize) -> Diagnostic {
@@ -69,14 +90,7 @@ fn fault(found: &Integrity, mirror: usize, dir: &Path) -> Diagnostic {
             dir.display()
         ),
     )
-    .help(format!(
-        "restore the files from a backup; or `{}` copies all readable data, and \
-             `actcheck run --resume ID --history NEW` makes the lost runs again",
-        ShellLine::default()
-            .fixed("actcheck merge --salvage")
-            .file(dir)
-            .fixed("--into NEW")
-    ))
+    .help(recovery(dir))
 }
 
 fn text(found: &Integrity, dir: &Path) -> String {

@@ -77,15 +77,18 @@ fn ask_history(args: &QueryArgs, text: &Source) -> Result<(), Diagnostics> {
     };
     output::print(&answer_table(&answer, format).render(format, output::page()));
     if is_empty(&answer) {
-        unknown(text);
+        unanswered(text)?;
     }
     Ok(())
 }
 
-/// Reports that a query has no answers, and its unknown terms, which may be the reason.
-pub(super) fn unknown(text: &Source) {
-    output::print_diagnostics(&unknown_terms(text, &vocabulary()));
+/// Reports that a query has no answers.
+///
+/// # Errors
+/// R028 for its unknown terms, which are the likely reason.
+pub(super) fn unanswered(text: &Source) -> Result<(), Diagnostics> {
     output::print_none("the query has no answers");
+    unknown_terms(text, &vocabulary()).or(())
 }
 
 fn is_empty(answer: &QueryAnswer) -> bool {

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use crate::options::QueryFormat;
-use crate::query::{QueryArgs, turtle_line, turtle_prefixes, unknown};
+use crate::query::{QueryArgs, turtle_line, turtle_prefixes, unanswered};
 use crate::{output, remote, stop};
 use actcheck_base::{Diagnostic, Diagnostics, Source, Term, names};
 use actcheck_history::{ForeignAnswer, check_query, without_counts};
@@ -70,7 +70,7 @@ fn print(format: QueryFormat, text: &Source, answer: ForeignAnswer) -> Result<()
         }
     };
     if is_empty {
-        unknown(text);
+        unanswered(text)?;
     }
     Ok(())
 }

@@ -1,11 +1,14 @@
 //! Runs to be replayed in a report, read in order, a batch at a time. Reading and explaining them
 //! takes most of a report's time, so all cores share the work.
 
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
+use std::sync::{Mutex, PoisonError};
 
 use crate::history_dir::unless_damaged;
+use crate::output;
 use crate::work::all_cores;
-use actcheck_base::{Diagnostics, Outcome};
+use actcheck_base::{Diagnostic, Diagnostics, Outcome};
 use actcheck_data::Trace;
 use actcheck_history::{History, RunDetail};
 use actcheck_ontology::Ontology;
@@ -33,11 +36,19 @@ pub(super) fn for_each_batch(
     // If the current rules can't be read, there are no explanations; the outcomes come from the
     // history.
     let rules = RuleBook::prepare_within(ontology, &budget).ok();
+    let lost = Mutex::new(BTreeMap::new());
     let read = |id: &String| -> Result<Option<ReplayedRun>, Diagnostics> {
         let run = history.newest_run(id)?;
         // A run that broke before its first state has no trace; everything else about it is
         // reported.
-        let trace = match unless_damaged(history.traces().whole_if_allowed(id))? {
+        let whole = history.traces().whole_if_allowed(id);
+        if let Err(faults) = &whole
+            && let Some(fault) = faults.iter().find(|fault| fault.code == "H009")
+        {
+            let mut lost = lost.lock().unwrap_or_else(PoisonError::into_inner);
+            lost.insert(id.clone(), fault.clone());
+        }
+        let trace = match unless_damaged(whole)? {
             Some(None) => return Ok(None),
             trace => trace.flatten(),
         };
@@ -72,10 +83,28 @@ pub(super) fn for_each_batch(
             .filter_map(Result::transpose)
             .collect::<Result<_, _>>()?;
         if take(runs)?.is_break() {
-            return Ok(());
+            break;
         }
     }
+    let lost = lost.into_inner().unwrap_or_else(PoisonError::into_inner);
+    if let Some(warning) = without_motion(&lost) {
+        output::print_diagnostics(&warning.into());
+    }
     Ok(())
+}
+
+/// Warns of runs that can't be replayed since files of the history were deleted.
+fn without_motion(lost: &BTreeMap<String, Diagnostic>) -> Option<Diagnostic> {
+    let (first, fault) = lost.first_key_value()?;
+    let runs = match lost.len() {
+        1 => format!("run {first}"),
+        runs => format!("{runs} runs, such as {first},"),
+    };
+    let message = format!("{runs} can't be replayed in the report: {}", fault.message);
+    Some(
+        Diagnostic::warning("H009", message)
+            .help("their outcomes are complete; restore the files from a backup to replay them"),
+    )
 }
 
 /// Leaves out runs whose motion is not kept, except the first ones: each must be simulated again.

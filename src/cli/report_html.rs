@@ -12,7 +12,7 @@ use actcheck_history::History;
 use actcheck_ontology::{Ontology, RuleLanguage};
 use actcheck_report::{
     FindingsSummary, HtmlReport, PackedRuns, PropertyWords, RelationsSummary, Replays, html,
-    replay_order,
+    html_data, replay_order,
 };
 
 /// Renders the whole page, with as many replays as fit into `room` bytes.
@@ -25,6 +25,53 @@ pub(super) fn page(
     room: f64,
     is_trusted: bool,
 ) -> Result<String, Diagnostics> {
+    let replays = Some((room, is_trusted));
+    rendered(found, history, replays, html)
+}
+
+/// Renders the data of the page, then the page for a server, which has the replays.
+///
+/// # Errors
+/// The history can't be read.
+pub(super) fn served(found: &Analysed, history: &History) -> Result<String, Diagnostics> {
+    rendered(found, history, None, |report| {
+        format!("{}\n{}", html_data(report), html(report))
+    })
+}
+
+/// Returns the replay of a run as a server sends it: a line of JSON.
+///
+/// # Errors
+/// The run can't be read.
+pub(super) fn replay(
+    history: &History,
+    ontology: &Ontology,
+    run: &str,
+) -> Result<String, Diagnostics> {
+    let id = history.resolve(run)?;
+    let looks = AppearanceReader::new(history, false);
+    let replays = replays(
+        history,
+        looks,
+        ontology,
+        std::slice::from_ref(&id),
+        f64::INFINITY,
+    )?;
+    match replays.data(&id) {
+        Some(data) => Ok(data),
+        // It was left out: its motion is not kept. Reading it alone reports the reason.
+        None => Err(history.traces().whole(&id).err().unwrap_or_default()),
+    }
+}
+
+/// Collects the content of the page and renders it. `embedded`: the room for replays in bytes, and
+/// whether programs may be started for them; `None` if a server has the page and the replays.
+fn rendered(
+    found: &Analysed,
+    history: &History,
+    embedded: Option<(f64, bool)>,
+    render: impl FnOnce(&HtmlReport<'_>) -> String,
+) -> Result<String, Diagnostics> {
     let Analysed {
         table,
         sample,
@@ -36,12 +83,15 @@ pub(super) fn page(
     let (runs, replays) = work::both(
         || PackedRuns::of(summary, table, sample.as_ref()),
         || {
+            let Some((room, is_trusted)) = embedded else {
+                return Ok(Replays::default());
+            };
             let looks = AppearanceReader::new(history, is_trusted);
             replays(history, looks, ontology, &order, room)
         },
     );
     let replays = replays?;
-    Ok(html(&HtmlReport {
+    Ok(render(&HtmlReport {
         version: env!("CARGO_PKG_VERSION"),
         made: &(clock::system().now)(),
         findings: summary,
@@ -52,6 +102,7 @@ pub(super) fn page(
         replays: &replays,
         contested: &history.contested()?,
         relations: &relations(history, summary)?,
+        served: embedded.is_none(),
     }))
 }
 

@@ -6,11 +6,14 @@ use std::sync::mpsc::channel;
 
 use clap::Args;
 
+use crate::analyse::{Question, analysed};
+use crate::chosen::ChosenRuns;
 use crate::option_fault::OptionFault;
 use crate::options::{HistoryArgs, duration, memory};
-use crate::{history_dir, named_queries, output, stop};
+use crate::{history_dir, named_queries, output, report_html, restore, stop};
 use actcheck_base::{Diagnostic, Diagnostics, did_you_mean};
 use actcheck_history::History;
+use actcheck_report::HTML_COLUMNS;
 use actcheck_serve as serve;
 use actcheck_serve::{ExampleQuery, ServeOptions};
 
@@ -41,6 +44,17 @@ pub struct ServeQueryArgs {
     /// The folder of the history.
     #[command(flatten)]
     pub history: HistoryArgs,
+}
+
+/// `actcheck serve-report`, which [`serve`] starts for the report and for replays.
+#[derive(Debug, Args)]
+pub struct ServeReportArgs {
+    /// Print the replay of this run, instead of the report and its data.
+    #[arg(long, value_name = "ID")]
+    pub run: Option<String>,
+    /// The runs to report, and their history.
+    #[command(flatten)]
+    pub chosen: ChosenRuns,
 }
 
 /// Parses a port of this machine, or an address with a port.
@@ -132,7 +146,7 @@ pub fn serve(args: &ServeArgs) -> Result<(), Diagnostics> {
     let serving = serve::serve(options(args, &folder)?).map_err(|error| unheard(args, &error))?;
     let address = serving.address;
     output::print_prose(&format!(
-        "http://{address}/ serves {}, with a report at http://{address}/report and SPARQL at http://{address}/sparql; Ctrl-C stops it\n",
+        "http://{address}/ serves the report of {}, with a query page at http://{address}/query and SPARQL at http://{address}/sparql; Ctrl-C stops it\n",
         folder.display()
     ));
     // Only Ctrl-C sends; if its handler is dropped, the wait ends too.
@@ -151,6 +165,26 @@ pub fn serve_query(args: &ServeQueryArgs) -> Result<(), Diagnostics> {
         )
         .into()
     })
+}
+
+/// Prints the report for the server, or the replay of a run.
+pub fn serve_report(args: &ServeReportArgs) -> Result<(), Diagnostics> {
+    let history = args.chosen.open()?;
+    restore::allow(&history, false);
+    let text = match &args.run {
+        Some(run) => report_html::replay(&history, &args.chosen.ontology()?, run)?,
+        None => {
+            let asked = Question {
+                chosen: &args.chosen,
+                property: &[],
+                by: &[],
+                usual_maps: true,
+            };
+            report_html::served(&analysed(&asked, &history, &HTML_COLUMNS)?, &history)?
+        }
+    };
+    output::print(&text);
+    Ok(())
 }
 
 fn options(args: &ServeArgs, folder: &Path) -> Result<ServeOptions, Diagnostics> {
@@ -180,7 +214,7 @@ fn options(args: &ServeArgs, folder: &Path) -> Result<ServeOptions, Diagnostics>
         history: folder.to_owned(),
         program,
         query_arguments: with_history(&["serve-query", "--history"]),
-        report_arguments: with_history(&["report", "--html", "-", "--history"]),
+        report_arguments: with_history(&["serve-report", "--history"]),
         address: args.port.ip(),
         port: args.port.port(),
         hosts: args.allow_host.clone(),

@@ -63,6 +63,17 @@ pub struct Appearances {
     pub links: BTreeMap<String, Vec<SeenPart>>,
     /// Of objects, by the name of the model. Frame: the model's.
     pub models: BTreeMap<String, Vec<SeenPart>>,
+    /// The place of the robot's camera, if it is known.
+    pub camera: Option<CameraPlace>,
+}
+
+/// The place of a camera, whose x axis points forwards and whose z axis points up in the image.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraPlace {
+    /// Name of its link in traces: `robot/LINK`; `None` if it is fixed in the world.
+    pub link: Option<String>,
+    /// Its pose. Frame: the link's, or the world.
+    pub pose: Pose,
 }
 
 impl SeenLink {

@@ -31,7 +31,7 @@ mod stream;
 mod trace;
 mod tree;
 
-pub use appearance::{Appearances, Colour, SeenLink, SeenPart};
+pub use appearance::{Appearances, CameraPlace, Colour, SeenLink, SeenPart};
 pub use choice_name::{ChoiceGroup, ChoiceName, OBSTACLE_LIST};
 pub use choice_parts::{ObjectAxis, PlacedObject, PlanarAxis, SightingAxis, StartAxis, WheelAxis};
 pub use choices::{Choice, ChoiceKind, ChoiceValue, Choices};

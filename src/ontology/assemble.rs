@@ -8,7 +8,7 @@ use crate::graph::{Graph, rdfs};
 use crate::read::Statement;
 use crate::{Action, Ontology, Property, RuleFile, RuleLanguage, Vocabulary, VocabularyTerm};
 use crate::{check, read, rule_files, unlinked};
-use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, Source, Term, names};
+use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, Severity, Source, Term, names};
 
 /// Loads an ontology with its imports and linked rule files.
 ///
@@ -21,6 +21,20 @@ use actcheck_base::{Diagnostic, Diagnostics, Digest, Files, Source, Term, names}
 /// unknown (O007, O008), a rule file is missing, has an unknown extension or an absolute path (O009
 /// to O011), the ontology has no action (O012), or a predicate is misspelt (O014).
 pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
+    load_with(files, path, Severity::Error)
+}
+
+/// As [`load`], to report outcomes that are stored: a rule file that can't be read is a warning
+/// (O009), and its property has an empty rule.
+///
+/// # Errors
+/// As [`load`], except for O009.
+pub fn load_to_report(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
+    load_with(files, path, Severity::Warning)
+}
+
+/// Reads an ontology. `missing`: how severe a rule file is that can't be read.
+fn load_with(files: &Files, path: &Path, missing: Severity) -> Result<Ontology, Diagnostics> {
     let mut found = Diagnostics::new();
     let graph = Graph::new(read::read(files, path, &mut found));
     // Missing definitions may be in the part that could not be parsed, so further checks would
@@ -28,8 +42,8 @@ pub fn load(files: &Files, path: &Path) -> Result<Ontology, Diagnostics> {
     if found.has_errors() {
         return Err(found);
     }
-    let libraries = libraries(&graph, &mut found);
-    let mut rules = property_rules(&graph, &mut found);
+    let libraries = libraries(&graph, missing, &mut found);
+    let mut rules = property_rules(&graph, missing, &mut found);
     let properties: BTreeMap<String, Property> = graph
         .individuals(&names::act("Property"))
         .into_iter()
@@ -106,7 +120,7 @@ fn in_order_of_place(found: Diagnostics, sources: &[Source]) -> Diagnostics {
 }
 
 /// Rule libraries without duplicates, sorted by path.
-fn libraries(graph: &Graph, found: &mut Diagnostics) -> Vec<RuleFile> {
+fn libraries(graph: &Graph, missing: Severity, found: &mut Diagnostics) -> Vec<RuleFile> {
     let predicate = names::act("ruleLibrary");
     let mut libraries: BTreeMap<(String, Arc<str>), RuleFile> = BTreeMap::new();
     for statement in graph
@@ -114,7 +128,7 @@ fn libraries(graph: &Graph, found: &mut Diagnostics) -> Vec<RuleFile> {
         .iter()
         .filter(|statement| *statement.predicate == *predicate)
     {
-        let Some(library) = rule_files::read(graph, statement, found) else {
+        let Some(library) = rule_files::read(graph, statement, missing, found) else {
             continue;
         };
         if library.language != RuleLanguage::Datalog
@@ -136,14 +150,18 @@ fn libraries(graph: &Graph, found: &mut Diagnostics) -> Vec<RuleFile> {
 }
 
 /// The rule file of each property, by IRI.
-fn property_rules(graph: &Graph, found: &mut Diagnostics) -> BTreeMap<String, RuleFile> {
+fn property_rules(
+    graph: &Graph,
+    missing: Severity,
+    found: &mut Diagnostics,
+) -> BTreeMap<String, RuleFile> {
     let mut rules = BTreeMap::new();
     for iri in graph.individuals(&names::act("Property")) {
         let links: Vec<&Statement> = graph.stated(&iri, &names::act("verifiedBy")).collect();
         match links.as_slice() {
             [] => found.push(check::unverified(graph, &iri)),
             [link] => {
-                if let Some(rule) = rule_files::read(graph, link, found) {
+                if let Some(rule) = rule_files::read(graph, link, missing, found) {
                     rules.insert(iri, rule);
                 }
             }

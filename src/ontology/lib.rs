@@ -15,7 +15,7 @@ mod rule_files;
 mod template;
 mod unlinked;
 
-pub use assemble::{load, load_vocabulary};
+pub use assemble::{load, load_to_report, load_vocabulary};
 pub use file_iri::encoded;
 pub use model::{Action, Ontology, Property, RuleFile, RuleLanguage, Vocabulary, VocabularyTerm};
 pub use read::triples_of;

@@ -6,16 +6,17 @@ use crate::file_iri::{beside, path_of_plain};
 use crate::graph::Graph;
 use crate::read::Statement;
 use crate::{RuleFile, RuleLanguage};
-use actcheck_base::{Diagnostic, Diagnostics, Files, Term, digest_of, nearest};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Severity, Source, Term, digest_of, nearest};
 
 /// Reads the rule file that a statement's object names: an IRI or a string with a path relative to
 /// the ontology file.
 ///
 /// Returns `None` and adds a fault if the path is not relative (O011), its extension is unknown
-/// (O010), or the file can't be read (O009).
+/// (O010), or the file can't be read (O009). If that is a warning by `missing`, the rule is empty.
 pub(super) fn read(
     graph: &Graph,
     statement: &Statement,
+    missing: Severity,
     found: &mut Diagnostics,
 ) -> Option<RuleFile> {
     let mention = match &statement.object {
@@ -66,8 +67,19 @@ pub(super) fn read(
         }
         Err(reason) => {
             let message = format!("cannot read the rule file `{path}`: {reason}");
-            fault("O009", message, help_for_missing(&home.files, &place));
-            None
+            found.push(Diagnostic {
+                severity: missing,
+                ..Diagnostic::error("O009", message)
+                    .at(source, span.clone())
+                    .help(help_for_missing(&home.files, &place))
+            });
+            (missing == Severity::Warning).then(|| RuleFile {
+                source: Source::new(path.as_str(), ""),
+                language,
+                digest: digest_of(""),
+                path,
+                linked_at: Some((source.clone(), span)),
+            })
         }
     }
 }

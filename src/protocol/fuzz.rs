@@ -59,6 +59,9 @@ fn joints() -> Joints {
         .collect();
     Joints {
         by_name,
+        names: roles.iter().map(|(name, _)| (*name).to_owned()).collect(),
+        limits: vec![([-3.0, 3.0], "rad"); roles.len()],
+        max_opening_m: 0.1,
         head: vec![4],
         drives: true,
     }

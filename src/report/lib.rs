@@ -24,7 +24,7 @@ pub use formats::{
 };
 pub use html::{
     Explained, HTML_COLUMNS, HtmlReport, MarginBound, PackedRuns, PropertyWords, ReplayedRun,
-    Replays, html, replay_order,
+    Replays, html, html_data, replay_order,
 };
 pub use json::{
     campaign_json, case_json, compare_json, engines_json, findings_json, health_json, labels_json,

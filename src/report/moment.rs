@@ -8,6 +8,13 @@ const MOVED_M: f64 = 0.01;
 /// A contact that ends closer than this to the end of its action does not count as lost. Unit:
 /// seconds.
 const LOST_SECS: f64 = 0.2;
+/// A gap between the fingers that is larger than the smallest one by at most this is as small. Unit:
+/// metres.
+const SAME_GAP_M: f64 = 0.002;
+/// Fingers that move by less than this between two measurements stand still. Unit: metres.
+const STILL_M: f64 = 1e-4;
+/// A hand closes if the gap becomes smaller by at least this. Unit: metres.
+const CLOSED_M: f64 = 0.01;
 /// Lead time: playback starts this long before the deciding event. Unit: seconds.
 const BEFORE_SECS: f64 = 0.3;
 
@@ -18,6 +25,8 @@ pub(super) enum Event {
     Touched,
     /// Something that it is not to touch moved.
     Moved,
+    /// The hand closed, on nothing or on something that it did not keep.
+    Closed,
     /// The robot lost contact with the object.
     Lost,
     /// A link was nearest to the object, which was never touched.
@@ -30,6 +39,7 @@ impl Event {
         match self {
             Self::Touched => "first contact",
             Self::Moved => "first movement",
+            Self::Closed => "the hand closes",
             Self::Lost => "last contact",
             Self::Nearest => "nearest approach",
         }
@@ -46,9 +56,10 @@ impl Event {
 /// seconds since the run began.
 ///
 /// In this order: the robot first touched named furniture or a named object that is not a parameter
-/// of the action; such an object moved; the robot lost contact with the named objects; if it never
-/// touched them, a link was nearest to them. If none applies, returns the end of the action. All
-/// but the last are shifted earlier by [`BEFORE_SECS`].
+/// of the action; such an object moved; the hand closed, unless the robot had lost contact with the
+/// named objects before; it lost that contact; if it never touched them, a link was nearest to them.
+/// If none applies, returns the end of the action. All but the last are shifted earlier by
+/// [`BEFORE_SECS`].
 pub(super) fn deciding_moment(trace: &Trace, action_idx: usize, witness: &str) -> f64 {
     let (start, end) = span(trace, action_idx);
     let event = deciding_event(trace, action_idx, &Named::of(trace, action_idx, witness));
@@ -182,14 +193,42 @@ fn deciding_event(trace: &Trace, action_idx: usize, named: &Named) -> Option<(f6
         return Some((first, Event::Moved));
     }
     let things: Vec<&String> = named.things.iter().collect();
-    match by_robot(&things)
+    let last = by_robot(&things)
         .into_iter()
         .map(|(_, end)| end)
-        .max_by(f64::total_cmp)
+        .max_by(f64::total_cmp);
+    if let Some(closed) = hand_closes(trace, action_idx)
+        && !things.is_empty()
+        && last.is_none_or(|last| closed <= last)
     {
+        return Some((closed, Event::Closed));
+    }
+    match last {
         Some(last) => (start + last < end - LOST_SECS).then_some((last, Event::Lost)),
         None => nearest(trace, &things, start, end).map(|secs| (secs, Event::Nearest)),
     }
+}
+
+/// When the fingers began to close to the smallest gap of an action, since it began. Returns `None`
+/// if they did not close, or if the trace does not have their gap. Unit: seconds.
+fn hand_closes(trace: &Trace, action_idx: usize) -> Option<f64> {
+    let course = trace.robot_courses.get(action_idx)?;
+    let gaps: Vec<(f64, f64)> = course
+        .motion
+        .moments()
+        .map(|moment| (f64::from(moment.time_secs), f64::from(moment.opening_m)))
+        .filter(|(_, gap)| gap.is_finite())
+        .collect();
+    let least = gaps.iter().map(|(_, gap)| *gap).min_by(f64::total_cmp)?;
+    let closed = gaps
+        .iter()
+        .position(|(_, gap)| *gap <= least + SAME_GAP_M)?;
+    let closing = gaps[..=closed].windows(2).rev();
+    let began = closed
+        - closing
+            .take_while(|pair| pair[0].1 > pair[1].1 + STILL_M)
+            .count();
+    (gaps[began].1 - least >= CLOSED_M).then_some(gaps[began].0)
 }
 
 /// Whether a text contains a whole word.
@@ -278,7 +317,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use crate::made_up::snapshot;
-    use actcheck_data::{ActionTrace, ContactEpisode};
+    use actcheck_data::{ActionTrace, ContactEpisode, Motion, RobotCourse};
 
     /// A pick of `glass_1` on `table_1` from 2 s to 12 s, in which the robot touched things for a
     /// second each.
@@ -310,6 +349,41 @@ mod tests {
         let witness = "glass_1 is 48.8 cm from the gripper, needs less than 5 cm";
         assert_eq!(stated_moment(&trace, 0, witness), (10.0, Some(Event::Lost)));
         assert!((deciding_moment(&trace, 0, witness) - 5.7).abs() < 1e-9);
+    }
+
+    /// The replay of a hand that closed beside the glass opened at the last frame.
+    #[test]
+    fn a_missed_grasp_is_decided_when_the_hand_closes() {
+        let mut trace = picked(&[("glass_1", 5.0)]);
+        let row = |secs: f32, gap: f32| {
+            let mut row = vec![0.0; 12];
+            (row[0], row[1]) = (secs, gap);
+            row
+        };
+        let gaps = [0.05, 0.135, 0.135, 0.1, 0.05, 0.0, 0.0, 0.0];
+        let rows = |from: f32| {
+            (0u8..)
+                .zip(gaps)
+                .map(move |(at, gap)| row(from + f32::from(at), gap))
+                .collect()
+        };
+        let course = |from| RobotCourse {
+            motion: Motion {
+                joints: Vec::new(),
+                rows: rows(from),
+            },
+            ..RobotCourse::default()
+        };
+        trace.robot_courses = vec![course(1.0)];
+        let witness = "glass_1 is 19.7 cm from the gripper, needs less than 5 cm";
+        assert_eq!(
+            stated_moment(&trace, 0, witness),
+            (10.0, Some(Event::Closed))
+        );
+        assert!((deciding_moment(&trace, 0, witness) - 2.7).abs() < 1e-9);
+        // A hand that closes after it has let go decided nothing.
+        trace.robot_courses = vec![course(4.5)];
+        assert_eq!(stated_moment(&trace, 0, witness), (10.0, Some(Event::Lost)));
     }
 
     #[test]

@@ -18,6 +18,8 @@ pub(super) struct Pressed {
     pub link: String,
     /// Id of the object, name of the other link, or `floor`.
     pub thing: String,
+    /// Whether the thing is another link of the robot.
+    pub of_robot: bool,
     /// Largest normal force. Unit: newtons.
     pub force_n: f64,
     /// Start and end, since the run began. Unit: seconds.
@@ -27,6 +29,15 @@ pub(super) struct Pressed {
 }
 
 impl Pressed {
+    /// The pressed body's name in traces: the floor, an object, or another link of the robot.
+    pub(super) fn body(&self) -> String {
+        if self.of_robot {
+            format!("{LINK}{}", self.thing)
+        } else {
+            self.thing.clone()
+        }
+    }
+
     /// The contact in a few words: `base_link presses coffee_table_1: 759 N`.
     pub(super) fn label(&self) -> String {
         let force = if self.force_n < 10.0 {
@@ -103,6 +114,7 @@ fn of_action(trace: &Trace, idx: usize) -> impl Iterator<Item = Pressed> {
             || Pressed {
                 link: link.to_owned(),
                 thing: thing.to_owned(),
+                of_robot: contact.pair.iter().all(|name| name.starts_with(LINK)),
                 force_n: contact.max_force_n,
                 secs: [start + contact.start_secs, start + contact.end_secs],
                 point_m: contact.point_m,

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::RobotModel;
-use actcheck_data::{SeenLink, SeenPart};
+use crate::layout::moved;
+use actcheck_data::{CameraPlace, LinkFrame, Pose, RobotProfile, SeenLink, SeenPart};
 
 impl RobotModel {
     /// Returns the appearance of the simulated links by their names in traces, from the file's links
@@ -24,5 +25,21 @@ impl RobotModel {
             .filter(|(_, seen)| seen.has_look)
             .map(|(link, seen)| (format!("robot/{}", self.links[link].name), seen.parts))
             .collect()
+    }
+
+    /// Returns the place of a camera by its simulated link. Returns `None` if the file has no such
+    /// link.
+    pub fn camera_place(&self, camera: &LinkFrame) -> Option<CameraPlace> {
+        let found = self.frames().find(|(name, _)| *name == camera.link);
+        if let Some((_, (link, at))) = found {
+            return Some(CameraPlace {
+                link: Some(format!("robot/{}", self.links[*link].name)),
+                pose: Pose::from_isometry(&(at * moved(camera))),
+            });
+        }
+        (camera.link == RobotProfile::MAP).then(|| CameraPlace {
+            link: None,
+            pose: Pose::from_isometry(&moved(camera)),
+        })
     }
 }

@@ -157,7 +157,7 @@ fn mounted(model: &RobotModel, camera: &LinkFrame) -> Result<Mount, RobotError> 
     }
 }
 
-fn moved(frame: &LinkFrame) -> Isometry3<f64> {
+pub(crate) fn moved(frame: &LinkFrame) -> Isometry3<f64> {
     let [roll, pitch, yaw] = frame.turned_rad;
     Translation3::from(Vector3::from(frame.offset_m))
         * UnitQuaternion::from_euler_angles(roll, pitch, yaw)

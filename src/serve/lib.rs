@@ -1,4 +1,5 @@
-//! Serves a history over HTTP: a read-only SPARQL 1.1 endpoint, a query page, and the report.
+//! Serves a history over HTTP: the report, which follows a campaign while it runs and replays every
+//! run, a query page, and a read-only SPARQL 1.1 endpoint.
 //!
 //! Light queries, which can be stopped at any moment and can't exhaust memory before, are answered
 //! by the server itself, within a slice of time. All others are answered by worker processes with

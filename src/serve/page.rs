@@ -52,7 +52,7 @@ pub(super) fn page(history: &str, examples: &[ExampleQuery]) -> String {
     format!(
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
          <title>Query {history}</title><link rel=\"stylesheet\" href=\"/style.css\"><script src=\"/query.js\" defer></script></head><body>\
-         <header><h1>Query the history <code>{history}</code></h1><a href=\"/report\">Report</a></header>\
+         <header><h1>Query the history <code>{history}</code></h1><a href=\"/\">Report</a></header>\
          <main><p>Read-only SPARQL 1.1; endpoint: <code>/sparql</code>. The prefixes below are predefined.</p>\
          <form id=\"form\" action=\"/sparql\" method=\"post\">\
          <label for=\"example\">Examples</label><select id=\"example\"><option value=\"\">choose an example …</option>{options}</select>\

@@ -10,10 +10,10 @@ use crate::question::Refusal;
 
 /// Policy of the query page: load its script and stylesheet, and connect to this server.
 pub(super) const PAGE_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'";
-/// Policy of the report, a single file with inline scripts and images that connects to no server.
+/// Policy of the report, a single file with inline scripts and images that connects to this server.
 /// The file also has a policy of its own, which names its scripts by digest; both apply. This one
 /// adds `frame-ancestors`, which only a header can set.
-pub(super) const REPORT_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' blob:; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+pub(super) const REPORT_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline' blob:; style-src 'unsafe-inline'; img-src data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 /// Policy of answers, which are not pages.
 pub(super) const NO_POLICY: &str = "default-src 'none'; frame-ancestors 'none'; sandbox";
 
@@ -33,6 +33,16 @@ impl Reply {
             media_type: media_type.to_owned(),
             policy,
             body: body.into(),
+        }
+    }
+
+    /// A reply that the client has the present state.
+    pub fn empty() -> Self {
+        Self {
+            status: 204,
+            media_type: "text/plain".to_owned(),
+            policy: NO_POLICY,
+            body: Bytes::new(),
         }
     }
 
@@ -92,7 +102,9 @@ pub(super) fn response(
         }
     };
     set(header::CONTENT_TYPE, &reply.media_type);
-    set(header::CONTENT_LENGTH, &length.to_string());
+    if reply.status != 204 {
+        set(header::CONTENT_LENGTH, &length.to_string());
+    }
     set(header::CONTENT_SECURITY_POLICY, reply.policy);
     set(header::X_CONTENT_TYPE_OPTIONS, "nosniff");
     set(header::X_FRAME_OPTIONS, "DENY");

@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 use std::net::{IpAddr, SocketAddr, TcpListener};
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use hyper::body::{Bytes, Incoming};
@@ -25,7 +25,7 @@ use crate::lanes::{Evaluated, Lanes, processors};
 use crate::page::{self, ExampleQuery};
 use crate::question::{Parts, Refusal, question};
 use crate::reply::{NO_POLICY, PAGE_POLICY, REPORT_POLICY, Reply, response};
-use crate::report::LiveReport;
+use crate::report::{LiveReport, Rendered};
 use crate::request::{PATIENCE, origin, read, text};
 use crate::snapshot::Snapshots;
 use crate::threads::Threads;
@@ -45,6 +45,8 @@ const SPARE_THREADS: usize = 6;
 const MOST_ANSWERS: u64 = 4;
 /// Unit in which memory for answers is counted. Unit: bytes.
 const MEMORY_UNIT: u64 = 64 << 10;
+/// Maximum number of processes that make replays: one for each side of a pair.
+const MOST_REPLAYS: usize = 2;
 /// Interval at which stalled connections are closed.
 const TIDY_EVERY: Duration = Duration::from_secs(1);
 
@@ -57,7 +59,8 @@ pub struct ServeOptions {
     pub program: PathBuf,
     /// Arguments with which it answers queries ([`crate::answer()`]).
     pub query_arguments: Vec<String>,
-    /// Arguments with which it prints the report.
+    /// Arguments with which it prints the data of the report, the report, and with `--run=ID` a
+    /// replay.
     pub report_arguments: Vec<String>,
     /// Address to listen on.
     pub address: IpAddr,
@@ -143,6 +146,8 @@ struct App {
     memory: Arc<Semaphore>,
     /// Concurrent requests for the report wait for the same page.
     rendering: Arc<tokio::sync::Mutex<()>>,
+    /// Processes for replays.
+    replays: Arc<Semaphore>,
 }
 
 impl App {
@@ -151,11 +156,7 @@ impl App {
             program: options.program.clone(),
             arguments: arguments.to_vec(),
         };
-        let report = LiveReport {
-            worker: worker(&options.report_arguments),
-            history: options.history.clone(),
-            kept: Mutex::new(None),
-        };
+        let report = LiveReport::new(worker(&options.report_arguments), &options.history);
         let page = page::page(&options.history.display().to_string(), &options.examples).into();
         let counts = Arc::new(Counts::default());
         let worker = worker(&options.query_arguments);
@@ -176,6 +177,7 @@ impl App {
             threads,
             memory: Arc::new(Semaphore::new(units.min(Semaphore::MAX_PERMITS))),
             rendering: Arc::default(),
+            replays: Arc::new(Semaphore::new(MOST_REPLAYS)),
             options,
         }
     }
@@ -289,10 +291,19 @@ impl App {
         );
         match path {
             "/sparql" => self.sparql(request, body).await,
-            "/" | "/style.css" | "/query.js" | "/report" | "/health" if !reads => {
+            "/" | "/query" | "/style.css" | "/query.js" | "/report" | "/data" | "/replay"
+            | "/health"
+                if !reads =>
+            {
                 Err(Refusal::new(405, "use GET or HEAD"))
             }
-            "/" => Ok(Reply::page(
+            "/" | "/report" => {
+                let page = self.live_report(LiveReport::cached).await?.page;
+                Ok(Reply::page("text/html; charset=utf-8", REPORT_POLICY, page))
+            }
+            "/data" => self.data(request.uri.query()).await,
+            "/replay" => self.replay(request.uri.query()).await,
+            "/query" => Ok(Reply::page(
                 "text/html; charset=utf-8",
                 PAGE_POLICY,
                 self.page.clone(),
@@ -312,32 +323,52 @@ impl App {
                 NO_POLICY,
                 self.counts.json(),
             )),
-            "/report" => self.live_report().await,
             _ => Err(Refusal::new(
                 404,
-                "not found: see /, /report, /sparql and /health",
+                "not found: see /, /query, /sparql and /health",
             )),
         }
     }
 
-    async fn live_report(&self) -> Result<Reply, Refusal> {
-        let page = match self.report.cached() {
-            Some(page) => page,
-            None => {
-                let alone = Arc::clone(&self.rendering).lock_owned().await;
-                let (report, (sender, receiver)) = (Arc::clone(&self.report), oneshot::channel());
-                std::thread::spawn(move || {
-                    let page = report.render();
-                    drop(alone);
-                    // The receiver is gone if the client is.
-                    let _ = sender.send(page);
-                });
-                receiver
-                    .await
-                    .map_err(|_| Refusal::new(500, "the report crashed"))??
-            }
-        };
-        Ok(Reply::page("text/html; charset=utf-8", REPORT_POLICY, page))
+    /// The report: the kept one if `kept` returns it, else a new one.
+    async fn live_report(
+        &self,
+        kept: impl FnOnce(&LiveReport) -> Option<Rendered>,
+    ) -> Result<Rendered, Refusal> {
+        if let Some(rendered) = kept(&self.report) {
+            return Ok(rendered);
+        }
+        let alone = Arc::clone(&self.rendering).lock_owned().await;
+        let report = Arc::clone(&self.report);
+        beside(move || {
+            let rendered = report.render();
+            drop(alone);
+            rendered
+        })
+        .await
+    }
+
+    /// The data of the report, or nothing if the client has them.
+    async fn data(&self, query: Option<&str>) -> Result<Reply, Refusal> {
+        let rendered = self.live_report(LiveReport::recent).await?;
+        Ok(if parameter(query, "state") == rendered.state {
+            Reply::empty()
+        } else {
+            Reply::page("application/json", NO_POLICY, rendered.data)
+        })
+    }
+
+    /// The replay of a run.
+    async fn replay(&self, query: Option<&str>) -> Result<Reply, Refusal> {
+        let run = parameter(query, "run");
+        let permit = Arc::clone(&self.replays).acquire_owned().await;
+        let report = Arc::clone(&self.report);
+        let replay = beside(move || {
+            let replay = report.replay(&run);
+            drop(permit);
+            replay
+        });
+        Ok(Reply::page("application/json", NO_POLICY, replay.await?))
     }
 
     async fn sparql(
@@ -410,6 +441,30 @@ impl App {
         };
         Err(Refusal::new(500, why))
     }
+}
+
+/// The value of a parameter of a request; empty if it is missing.
+fn parameter(query: Option<&str>, name: &str) -> String {
+    let pairs = form_urlencoded::parse(query.unwrap_or_default().as_bytes());
+    let mut found = pairs.filter(|(known, _)| known == name);
+    found
+        .next()
+        .map(|(_, value)| value.into_owned())
+        .unwrap_or_default()
+}
+
+/// Does a task in a thread of its own.
+async fn beside<T: Send + 'static>(
+    task: impl FnOnce() -> Result<T, Refusal> + Send + 'static,
+) -> Result<T, Refusal> {
+    let (sender, receiver) = oneshot::channel();
+    std::thread::spawn(move || {
+        // The receiver is gone if the client is.
+        let _ = sender.send(task());
+    });
+    receiver
+        .await
+        .map_err(|_| Refusal::new(500, "the report crashed"))?
 }
 
 fn memory_units(bytes: u64) -> u64 {

@@ -88,5 +88,6 @@ pub fn page(
         replays,
         contested: &BTreeMap::new(),
         relations: &[],
+        served: false,
     })
 }

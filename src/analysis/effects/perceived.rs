@@ -116,9 +116,14 @@ impl PerceptionError {
     }
 
     /// Describes the error of an object with an id, such as
-    /// `glass_1 was perceived 5.3 cm left of where it was`, as seen from the robot's base: *behind*
-    /// is farther ahead of it. Returns `None` for an error below 1 cm.
+    /// `glass_1 was perceived 5.3 cm left of where it was`. Returns `None` for an error below 1 cm.
     pub fn sentence(&self, id: &str) -> Option<String> {
+        Some(format!("{id} was {}", self.words()?))
+    }
+
+    /// Describes the error, such as `perceived 5.3 cm left of where it was`, as seen from the
+    /// robot's base: *behind* is farther ahead of it. Returns `None` for an error below 1 cm.
+    pub fn words(&self) -> Option<String> {
         let parts = [
             (self.left_m, ["left of", "right of"]),
             (self.ahead_m, ["behind", "in front of"]),
@@ -138,7 +143,7 @@ impl PerceptionError {
             [first @ .., last] if !first.is_empty() => format!("{} and {last}", first.join(", ")),
             all => all.join(""),
         };
-        Some(format!("{id} was perceived {place} where it was"))
+        Some(format!("perceived {place} where it was"))
     }
 }
 

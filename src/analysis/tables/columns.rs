@@ -1,5 +1,6 @@
 //! The columns of the table: name, type, unit, description and source.
 
+use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
 use serde::Serialize;
@@ -194,6 +195,11 @@ const COLUMNS: &[Column] = &[
         "designators",
         "designators of the action with their values; objects are given by their models (JSON)",
         designators,
+    ),
+    text(
+        "objects",
+        "models of all objects of the scene, each with its class: `glass (Glass), mug (Mug)`",
+        objects,
     ),
     text("world", "name of the world", |p| Cell::text(&p.run.world)).of_scene(),
     number(
@@ -627,6 +633,19 @@ fn category(object: Option<&ObjectDetail>) -> Cell {
 
 fn neighbour<'a>(source: &RowSource<'a>) -> Option<&'a ObjectDetail> {
     source.scene.neighbour.map(|(object, _)| object)
+}
+
+fn objects(source: &RowSource<'_>) -> Cell {
+    let named = |object: &ObjectDetail| {
+        let (model, class) = (&object.model, names::local(&object.category));
+        if class.is_empty() {
+            model.clone()
+        } else {
+            format!("{model} ({class})")
+        }
+    };
+    let all: BTreeSet<String> = source.run.objects.iter().map(named).collect();
+    Cell::text(all.into_iter().collect::<Vec<_>>().join(", "))
 }
 
 fn of_target(source: &RowSource<'_>, number: impl Fn(&ObjectDetail) -> f64) -> Cell {

@@ -7,6 +7,25 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use crate::foreign::frames::Included;
 use actcheck_base::{Diagnostic, Diagnostics, Source, SourceSpan, Span, check_xml, did_you_mean};
 
+/// Roots of files that other MJCF files include, and that are not elements of URDF or SDF.
+const MJCF_PARTS: [&str; 15] = [
+    "mujocoinclude",
+    "worldbody",
+    "body",
+    "default",
+    "asset",
+    "actuator",
+    "sensor",
+    "contact",
+    "tendon",
+    "equality",
+    "compiler",
+    "option",
+    "keyframe",
+    "geom",
+    "site",
+];
+
 /// Longest text of a model, robot or world; meshes have files of their own. Unit: bytes.
 pub(crate) const LONGEST_MODEL: usize = 16 << 20;
 /// Largest number of elements of one of the kinds in [`PARTS`]: each is simulated, or compared with
@@ -339,6 +358,12 @@ impl<'a> Reader<'a> {
             return Some(());
         }
         let message = format!("the root is `<{found}>` instead of `<{name}>`");
+        // A fragment has the elements of MJCF, but is no model of its own.
+        let help = if MJCF_PARTS.contains(&found) {
+            "this is a part of an MJCF model: name the file with `<mujoco>` that includes it"
+        } else {
+            help
+        };
         self.error("W032", root, message, help);
         None
     }

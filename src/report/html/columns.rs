@@ -7,11 +7,12 @@ use serde_json::{Value, json};
 
 use crate::FindingsSummary;
 use crate::html::pack::Pack;
-use actcheck_analysis::{ColumnKind, OutcomeTable, columns};
+use crate::summary::quantity_name;
+use actcheck_analysis::{ColumnKind, OutcomeTable, PerceptionError, columns};
 use actcheck_base::{Outcome, names};
 
 /// Columns that a page needs in addition to those of the findings.
-pub const HTML_COLUMNS: [&str; 9] = [
+pub const HTML_COLUMNS: [&str; 11] = [
     "index",
     "repetition",
     "test",
@@ -21,6 +22,8 @@ pub const HTML_COLUMNS: [&str; 9] = [
     "witness",
     "target_displacement_m",
     "others_displacement_m",
+    "reported",
+    "objects",
 ];
 
 /// Code for a property that a run does not have.
@@ -154,6 +157,7 @@ fn runs(
     let started = kinds(detailed, "started", &rows, &mut pack);
     pack.set("started", started);
     steps(detailed, &mut pack);
+    objects(detailed, &rows, &mut pack);
     let parameters: Vec<Value> = columns()
         .iter()
         .filter(|column| column.is_condition() || column.is_effect() || column.name.ends_with("_displacement_m"))
@@ -163,7 +167,7 @@ fn runs(
                 _ => pack.numbers(&of_rows(detailed, column.name, &rows)),
             };
             Some(json!({
-                "name": column.name, "unit": column.unit, "told": column.description, "role": column.role,
+                "name": column.name, "label": quantity_name(column.name, Some(column.unit)), "unit": column.unit, "told": column.description, "role": column.role,
                 "values": values?,
             }))
         })
@@ -372,7 +376,74 @@ fn slot_of(table: &OutcomeTable, row: usize) -> Option<Slot> {
     })
 }
 
-/// Packs the message and duration of each action, step by step.
+/// Packs the objects of each run: the distinct ones, then those of all runs one after another by
+/// their places, and where each run's end.
+fn objects(table: &OutcomeTable, rows: &[usize], pack: &mut Pack) {
+    let column = table.text("objects");
+    let mut known: FxHashMap<&str, u32> = FxHashMap::default();
+    let (mut items, mut of, mut ends) = (Vec::new(), Vec::new(), Vec::new());
+    for row in rows {
+        let listed = column.get(*row).unwrap_or_default().split(", ");
+        of.extend(listed.filter(|item| !item.is_empty()).map(|item| {
+            *known.entry(item).or_insert_with(|| {
+                items.push(item);
+                // A page has far fewer than 2³² objects.
+                items.len() as u32 - 1
+            })
+        }));
+        ends.push(of.len() as u32);
+    }
+    let (of, ends) = (pack.places(&of), pack.places(&ends));
+    pack.set("objects", json!({ "items": items, "of": of, "ends": ends }));
+}
+
+/// Packs texts of rows that are made here: the distinct ones, then an index for each row (0: no
+/// text).
+fn made_texts(texts: impl Iterator<Item = Option<String>>, pack: &mut Pack) -> Value {
+    let mut known: BTreeMap<String, u32> = BTreeMap::new();
+    let mut distinct = Vec::new();
+    let places: Vec<u32> = texts
+        .map(|text| {
+            text.map_or(0, |text| {
+                *known.entry(text).or_insert_with_key(|text| {
+                    distinct.push(text.clone());
+                    distinct.len() as u32
+                })
+            })
+        })
+        .collect();
+    let of_run = pack.places(&places);
+    json!({ "kind": "texts", "texts": distinct, "of": of_run })
+}
+
+/// For each run, whether a property failed.
+fn failed_runs(table: &OutcomeTable) -> Vec<bool> {
+    let (runs, words) = (table.text("run"), table.text("outcome"));
+    let mut failed = vec![false; runs.texts.len()];
+    for (row, run) in runs.of_row.iter().enumerate() {
+        if let Some(run) = run {
+            failed[*run as usize] |= words.get(row) == Some(Outcome::Failed.word());
+        }
+    }
+    failed
+}
+
+/// The error with which the action of a row perceived its target, in words.
+fn perceived(table: &OutcomeTable, row: usize) -> Option<String> {
+    let part = |name: &str| {
+        let value = table.number(name).get(row).copied();
+        value.filter(|value| value.is_finite())
+    };
+    let error = PerceptionError {
+        ahead_m: part("target_perceived_ahead_m")?,
+        left_m: part("target_perceived_left_m")?,
+        above_m: part("target_perceived_above_m")?,
+    };
+    error.words()
+}
+
+/// Packs the message and duration of each action, step by step, whether it reported success, and
+/// how far off it perceived its target.
 fn steps(table: &OutcomeTable, pack: &mut Pack) {
     let runs = table.text("run");
     let steps = table.number("step");
@@ -387,6 +458,7 @@ fn steps(table: &OutcomeTable, pack: &mut Pack) {
             rows[*step as usize - 1][run as usize].get_or_insert(row);
         }
     }
+    let failed = failed_runs(table);
     let steps: Vec<Value> = rows
         .iter()
         .map(|rows| {
@@ -394,7 +466,12 @@ fn steps(table: &OutcomeTable, pack: &mut Pack) {
             let rows: Vec<usize> = rows.iter().map(|row| row.unwrap_or(table.len())).collect();
             let messages = kinds(table, "message", &rows, pack);
             let action = kinds(table, "action", &rows, pack);
-            json!({ "action": action, "message": messages, "seconds": pack.numbers(&of_rows(table, "duration_s", &rows)) })
+            let told = rows.iter().zip(&failed).map(|(row, failed)| failed.then(|| perceived(table, *row))?);
+            let perceived = made_texts(told, pack);
+            json!({
+                "action": action, "message": messages, "seconds": pack.numbers(&of_rows(table, "duration_s", &rows)),
+                "reported": pack.numbers(&of_rows(table, "reported", &rows)), "perceived": perceived,
+            })
         })
         .collect();
     pack.set("steps", steps);

@@ -31,13 +31,17 @@ pub(super) fn action(
             Some(signal) if failed && trace.is_some() => Some((started + signal.at_secs(), None)),
             _ => trace.filter(|_| failed).map(|trace| stated_moment(trace, idx, &judgement.witness)),
         };
+        let decided = match signals.first() {
+            Some(_) => stated.map(|(secs, _)| secs),
+            None => trace.filter(|_| failed).map(|trace| deciding_moment(trace, idx, &judgement.witness)),
+        };
         json!({
             "signals": signals.iter().map(deciding).collect::<Vec<Value>>(),
             "stated": stated.map(|(secs, _)| secs), "event": stated.and_then(|(_, event)| event).map(Event::words),
             "property": judgement.property, "outcome": judgement.outcome.word(), "margin": judgement.margin,
             "witness": judgement.witness, "held": judgement.held_before, "why": why.map(|why| &why.text),
             "pressed": pressed.map(|pressed| pressed.sentence()),
-            "decided": trace.filter(|_| failed).map(|trace| deciding_moment(trace, idx, &judgement.witness)),
+            "decided": decided,
         })
     });
     let perceived = trace.and_then(|trace| perceived_sentences(run, trace).remove(&action.step));

@@ -32,6 +32,8 @@ pub struct HtmlReport<'a> {
     pub contested: &'a BTreeMap<String, BTreeSet<String>>,
     /// The relations between pairs of runs, of each campaign that has some.
     pub relations: &'a [RelationsSummary],
+    /// Whether a server has the page: then it asks the server for replays and for changes.
+    pub served: bool,
 }
 
 /// Names and descriptions of a property.

@@ -39,7 +39,7 @@ fn of_action(pack: &mut Pack, motion: &Motion) -> Value {
         .iter()
         .map(|moment| moment.joints().collect())
         .collect();
-    let parts: [(fn(&JointMoment) -> f32, f32); 3] = [
+    let parts: [(Part, f32); 3] = [
         (|joint| joint.position, POSITION_STEP),
         (|joint| joint.effort, EFFORT_STEP),
         (|joint| joint.target - joint.position, POSITION_STEP),
@@ -54,6 +54,9 @@ fn of_action(pack: &mut Pack, motion: &Motion) -> Value {
         "steps": [POSITION_STEP, EFFORT_STEP], "rows": pack.trajectories(&columns),
     })
 }
+
+/// A quantity of a joint.
+type Part = fn(&JointMoment) -> f32;
 
 /// Values as whole steps. Values that are not finite repeat the previous one.
 fn steps(values: impl Iterator<Item = f32>, step: f32) -> Vec<i16> {

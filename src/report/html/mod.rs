@@ -24,5 +24,5 @@ mod summary;
 pub use columns::{HTML_COLUMNS, PackedRuns};
 pub use input::{Explained, HtmlReport, MarginBound, PropertyWords};
 pub use order::replay_order;
-pub use page::html;
+pub use page::{html, html_data};
 pub use replay::{ReplayedRun, Replays};

@@ -2,6 +2,7 @@
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use serde_json::json;
 use sha2::{Digest as _, Sha256};
 
 use crate::html::HtmlReport;
@@ -26,7 +27,7 @@ pub fn html(report: &HtmlReport<'_>) -> String {
     let mut page = String::with_capacity(before.len() + behind.len() + script.len() + 64 * 1024);
     let mut rest = SHELL;
     for (place, filling) in [
-        ("{{policy}}", policy(&script)),
+        ("{{policy}}", policy(&script, report.served)),
         ("{{style}}", STYLE.join("\n")),
         ("{{before}}", before),
         ("{{script}}", script),
@@ -41,17 +42,25 @@ pub fn html(report: &HtmlReport<'_>) -> String {
     page
 }
 
+/// Returns the data of a report without its page, as its script reads them: a line of JSON with
+/// `summary` and `runs`.
+pub fn html_data(report: &HtmlReport<'_>) -> String {
+    let (summary, runs) = (summary(report, &report.runs.slots), &report.runs.packed);
+    json!({ "summary": summary, "runs": runs }).to_string()
+}
+
 /// A data element for the script to read; browsers do not execute it.
 fn data(id: &str, packed: &str) -> String {
     format!("<script type=\"text/plain\" id=\"data-{id}\">{packed}</script>\n")
 }
 
 /// The content security policy: only this script and the library that it unpacks may run. Nothing
-/// may be loaded.
-fn policy(script: &str) -> String {
+/// may be loaded, except from the server of the page.
+fn policy(script: &str, served: bool) -> String {
     let digest = STANDARD.encode(Sha256::digest(script.as_bytes()));
+    let connect = if served { "'self'" } else { "'none'" };
     format!(
-        "default-src 'none'; script-src 'sha256-{digest}' blob:; style-src 'unsafe-inline'; img-src data: blob:; \
+        "default-src 'none'; script-src 'sha256-{digest}' blob:; style-src 'unsafe-inline'; img-src data: blob:; connect-src {connect}; \
          base-uri 'none'; form-action 'none'"
     )
 }

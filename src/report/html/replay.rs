@@ -15,7 +15,9 @@ use crate::html::shapes::Shapes;
 use crate::json::skill_json;
 use crate::pressed::hardest_of_run;
 use actcheck_base::{Outcome, names};
-use actcheck_data::{Appearances, BodyState, Form, Pose, Role, SeenPart, Snapshot, Trace};
+use actcheck_data::{
+    Appearances, BodyState, CameraPlace, Form, Pose, Role, SeenPart, Snapshot, Trace,
+};
 use actcheck_history::{ObjectDetail, RunDetail};
 
 /// Smallest quantisation step of positions, which is the resolution of traces. The step is larger
@@ -102,6 +104,13 @@ impl Replays {
     /// Size in the page, in bytes.
     pub fn bytes(&self) -> usize {
         self.bytes
+    }
+
+    /// Returns a run with the shapes of all, as the page's script reads them: a line of JSON with
+    /// `forms` and `replay`. Returns `None` if the run was not added.
+    pub fn data(&self, run: &str) -> Option<String> {
+        let replay = self.runs.get(run)?;
+        Some(json!({ "forms": self.forms(), "replay": replay }).to_string())
     }
 
     /// Ids of the runs, with their packed data.
@@ -205,6 +214,7 @@ impl Replays {
             still,
             tracks,
             slots,
+            camera: appearances.camera.as_ref().map_or(Value::Null, camera),
         }
     }
 }
@@ -223,6 +233,18 @@ fn look<'a>(
     Some((model, parts))
 }
 
+/// The place of a camera: its link, or where it is, and its pose there.
+fn camera(place: &CameraPlace) -> Value {
+    let at: Vec<f64> = (place.pose.position.iter())
+        .chain(&place.pose.rotation)
+        .copied()
+        .collect();
+    match &place.link {
+        Some(link) => json!({ "link": link, "pose": at }),
+        None => json!({ "at": [0, 0, 0, 0, 0, 0, 1], "pose": at }),
+    }
+}
+
 /// The robot's links in a state, by their names in traces.
 fn links(state: &Snapshot) -> impl Iterator<Item = (String, Pose)> {
     let links = state.robot.links.iter();
@@ -236,6 +258,8 @@ struct Bodies {
     tracks: Vec<Value>,
     /// Place of each track in the frames.
     slots: Vec<usize>,
+    /// Place of the robot's camera, or `null`.
+    camera: Value,
 }
 
 fn packed_runs(runs: &[(&ReplayedRun, Bodies)]) -> Vec<String> {
@@ -264,6 +288,7 @@ impl Bodies {
             let joints = joints(&mut pack, trace);
             pack.set("joints", joints);
             pack.set("skill", skill_json(trace));
+            pack.set("camera", self.camera.clone());
         }
         pack.finish()
     }
@@ -291,7 +316,7 @@ fn pressed(run: &RunDetail, trace: &Trace) -> Value {
     });
     hardest_of_run(trace, judged).map_or(
         Value::Null,
-        |pressed| json!({ "at": pressed.point_m, "label": pressed.label(), "told": pressed.sentence(), "secs": pressed.secs }),
+        |pressed| json!({ "at": pressed.point_m, "thing": pressed.body(), "label": pressed.label(), "told": pressed.sentence(), "secs": pressed.secs }),
     )
 }
 
@@ -449,6 +474,7 @@ mod tests {
                 .map(|(name, red)| (name.to_owned(), look(red)))
                 .into(),
             models: [("glass".to_owned(), look(3))].into(),
+            camera: None,
         };
         assert!(!replays.knows("a"));
         replays.set_appearances("a", Arc::new(appearances));

@@ -11,9 +11,11 @@ pub(super) const STYLE: [&str; 5] = [
 ];
 
 /// Scripts. All share one scope; the last one starts the program.
-pub(super) const SCRIPT: [&str; 34] = [
+pub(super) const SCRIPT: [&str; 38] = [
     include_str!("web/dom.js"),
+    include_str!("web/sorted.js"),
     include_str!("web/unpack.js"),
+    include_str!("web/served.js"),
     include_str!("web/words.js"),
     include_str!("web/outcomes.js"),
     include_str!("web/runs.js"),
@@ -37,6 +39,7 @@ pub(super) const SCRIPT: [&str; 34] = [
     include_str!("web/closest.js"),
     include_str!("web/labels.js"),
     include_str!("web/orbit.js"),
+    include_str!("web/views.js"),
     include_str!("web/stage.js"),
     include_str!("web/signals.js"),
     include_str!("web/quantities.js"),
@@ -45,6 +48,7 @@ pub(super) const SCRIPT: [&str; 34] = [
     include_str!("web/timeline.js"),
     include_str!("web/player.js"),
     include_str!("web/run.js"),
+    include_str!("web/pair.js"),
     include_str!("web/main.js"),
 ];
 

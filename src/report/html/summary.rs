@@ -26,6 +26,7 @@ pub(super) fn summary(report: &HtmlReport<'_>, slots: &Slots) -> String {
     let mut findings = findings_with(report.findings, modes(report, &places));
     number_runs(&mut findings, &places);
     let mut pack = Pack::default();
+    pack.set("served", report.served);
     pack.set("version", report.version);
     pack.set("made", report.made);
     pack.set("history", report.findings.history.as_str());

@@ -4,6 +4,7 @@
 use crate::FindingsSummary;
 use crate::picture::drawing::{Drawing, Line, Paint, Rect, Style, Words};
 use crate::picture::{font, paint};
+use crate::summary::quantity_name;
 use actcheck_analysis::{Condition, Parameter, Pattern, PatternInput};
 
 /// Width of a picture. Unit: pixels.
@@ -134,7 +135,12 @@ impl<'a> Axis<'a> {
     }
 
     fn name(&self) -> String {
-        self.parameter.name.replace('_', " ")
+        let unit = self.parameter.unit.as_deref();
+        let name = quantity_name(&self.parameter.name, unit);
+        match unit {
+            Some(unit) if unit != "1" => format!("{name} ({unit})"),
+            _ => name,
+        }
     }
 
     /// About five round numbers.

@@ -296,7 +296,7 @@ impl CampaignSummary {
     pub(crate) fn resume(&self) -> ShellLine {
         ShellLine::new(&self.program)
             .fixed("run")
-            .word(&format!("--resume={}", self.campaign))
+            .word(format!("--resume={}", self.campaign))
             .option("--history", &self.history)
     }
 

@@ -235,7 +235,7 @@ fn quantity(value: f64, unit: Option<&str>) -> String {
 /// target 3.8 cm or more beside its place`.
 fn plain_condition(condition: &Condition, parameter: &Parameter) -> String {
     let unit = parameter.unit.as_deref();
-    let bare = bare_name(parameter);
+    let bare = without_unit(&parameter.name, unit);
     let value = |value: f64| quantity(value, unit);
     if let (Some(of), Condition::Range { low, high, .. }) = (bare.strip_prefix(DRAWN), condition) {
         let amount = match (low, high) {
@@ -299,15 +299,19 @@ fn plain_condition(condition: &Condition, parameter: &Parameter) -> String {
     }
 }
 
-/// The name of a parameter without its unit.
-fn bare_name(parameter: &Parameter) -> &str {
-    match &parameter.unit {
-        Some(unit) => parameter
-            .name
-            .strip_suffix(&format!("_{}", unit.to_lowercase()))
-            .unwrap_or(&parameter.name),
-        None => &parameter.name,
+/// The name of a column's quantity in sentences, on axes and in lists, such as
+/// `drawn error of target xy`.
+pub(crate) fn quantity_name(column: &str, unit: Option<&str>) -> String {
+    let bare = without_unit(column, unit);
+    match bare.strip_prefix(DRAWN) {
+        Some(of) => format!("drawn error of {}", of.replace('_', " ")),
+        None => bare.replace('_', " "),
     }
+}
+
+fn without_unit<'a>(column: &'a str, unit: Option<&str>) -> &'a str {
+    unit.and_then(|unit| column.strip_suffix(&format!("_{}", unit.to_lowercase())))
+        .unwrap_or(column)
 }
 
 /// Describes a condition, such as `target friction < 0.35`.
@@ -316,11 +320,8 @@ fn condition_text(condition: &Condition, parameter: &Parameter) -> String {
         .unit
         .as_ref()
         .map_or_else(String::new, |unit| format!(" {unit}"));
-    let bare = bare_name(parameter);
-    let name = match bare.strip_prefix(DRAWN) {
-        Some(of) => format!("drawn error of {}", of.replace('_', " ")),
-        None => bare.replace('_', " "),
-    };
+    let bare = without_unit(&parameter.name, parameter.unit.as_deref());
+    let name = quantity_name(&parameter.name, parameter.unit.as_deref());
     match condition {
         Condition::Kind { kind, .. } => {
             let thing = bare

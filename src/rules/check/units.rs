@@ -50,8 +50,18 @@ fn combine(a: Dimension, b: Dimension, sign: i8) -> Dimension {
     std::array::from_fn(|idx| a[idx].saturating_add(b[idx].saturating_mul(sign)))
 }
 
+/// Dimensions with a name of their own.
+const NAMED: [(&str, Dimension); 3] = [
+    ("N", [1, 1, -2, 0]),
+    ("N·m", [2, 1, -2, 0]),
+    ("W", [2, 1, -3, 0]),
+];
+
 /// Formats a dimension.
 fn shown(dimension: Dimension) -> String {
+    if let Some((name, _)) = NAMED.iter().find(|(_, named)| *named == dimension) {
+        return (*name).to_owned();
+    }
     let part = |wanted: fn(i8) -> bool| -> String {
         let symbols = ["m", "kg", "s", "rad"]
             .into_iter()
@@ -509,5 +519,19 @@ impl Seen<'_> {
             | "geo3d:tilt" => Some(RADIAN),
             _ => None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A force was called `m·kg/s2`.
+    #[test]
+    fn derived_units_have_their_names() {
+        for name in ["N", "N·m", "m", "m/s", "kg"] {
+            assert_eq!(dimension(name).map(shown).as_deref(), Some(name));
+        }
+        assert_eq!(shown(NONE), "a plain number");
     }
 }

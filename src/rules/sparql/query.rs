@@ -21,9 +21,9 @@ use crate::sparql::query_text::{first_group, groups, scan, variables};
 use crate::sparql::varying::varying;
 use crate::watch::Watch;
 use actcheck_base::{
-    COUNTED_TEXT, Diagnostic, Diagnostics, Findings, MOST_NESTED_CALLS, RuleFault, Severity,
-    Source, Span, TEXT_FUNCTIONS, Term, WitnessRow, bounded_texts, check_calls, names,
-    sparql_excess, unclosed_braces,
+    COUNTED_TEXT, Diagnostic, Diagnostics, Findings, MOST_NESTED_CALLS, RuleFault, Source, Span,
+    TEXT_FUNCTIONS, Term, WitnessRow, bounded_texts, check_calls, names, sparql_excess,
+    unclosed_braces,
 };
 use actcheck_ontology::{Ontology, Vocabulary};
 
@@ -47,7 +47,13 @@ impl Query {
     ) -> Result<Self, Diagnostics> {
         let mut diagnostics = Diagnostics::new();
         if !ontology.vocabulary.terms.is_empty() {
-            check_vocabulary(source, &ontology.vocabulary, derived, &mut diagnostics);
+            check_vocabulary(
+                source,
+                &ontology.vocabulary,
+                derived,
+                "describe it in the ontology",
+                &mut diagnostics,
+            );
         }
         if let Some((span, message)) = sparql_excess(&source.text) {
             diagnostics.push(
@@ -437,17 +443,12 @@ fn expected(message: &str) -> String {
     }
 }
 
-/// Returns warnings about terms of our namespaces in a query that the vocabulary lacks.
+/// Returns faults about terms of our namespaces in a query that the vocabulary lacks.
 pub fn unknown_terms(source: &Source, vocabulary: &Vocabulary) -> Diagnostics {
     let mut found = Diagnostics::new();
-    check_vocabulary(source, vocabulary, &BTreeSet::new(), &mut found);
+    let help = "`actcheck query --named` lists queries with the terms of histories, and `ontology/history.ttl` describes all";
+    check_vocabulary(source, vocabulary, &BTreeSet::new(), help, &mut found);
     found
-        .into_iter()
-        .map(|fault| Diagnostic {
-            severity: Severity::Warning,
-            ..fault
-        })
-        .collect()
 }
 
 /// Checks that terms of our namespaces are in the vocabulary, as in Datalog.
@@ -455,6 +456,7 @@ fn check_vocabulary(
     source: &Source,
     vocabulary: &Vocabulary,
     derived: &BTreeSet<String>,
+    help_without: &str,
     diagnostics: &mut Diagnostics,
 ) {
     for token in scan(&source.text) {
@@ -484,7 +486,7 @@ fn check_vocabulary(
                 "did you mean `{}`?",
                 names::shorten(&format!("{namespace}{found}"))
             ),
-            None => "describe it in the ontology".to_owned(),
+            None => help_without.to_owned(),
         };
         let span: Span = token.span.clone();
         let message = format!("the ontology has no term `{}`", names::shorten(iri));

@@ -1,7 +1,7 @@
 // Addresses: the view, its contents and the filter are in the fragment, so that a link opens the same view again, also from a file.
 
 /** Views whose addresses include the filter. */
-const FILTERED = new Set(["runs", "map", "run"]);
+const FILTERED = new Set(["runs", "map", "run", "pair"]);
 
 /** The parts of `#/run/ID?t=3.2&outcome=failed`: its way and its query. */
 function wayOf(hash) {

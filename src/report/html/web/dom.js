@@ -33,9 +33,11 @@ function fill(element, ...children) {
   return element;
 }
 
-/** A box that scrolls sideways, also with the keyboard. */
+/** A box that scrolls sideways, also with the keyboard. A table in it can be sorted by each column. */
 function scroller(label, ...children) {
-  return make("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": label }, children);
+  const box = make("div", { class: "scroll", tabindex: "0", role: "group", "aria-label": label }, children);
+  for (const table of box.querySelectorAll("table")) sortable(table);
+  return box;
 }
 
 /** Local name of an IRI: the part after the last `#` or `/`. */

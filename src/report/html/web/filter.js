@@ -52,8 +52,14 @@ class Filter {
     return {
       text: query.get("q") ?? "", outcome: one("outcome", OUTCOMES), campaign: one("campaign", runs.campaign.texts),
       slot: place(runs.slots, slotKey, "property"), mode: place(modes, modeKey, "mode"), replay: query.get("replays") === "1",
-      pattern: one("pattern", [...this.sets.keys()]), sort: one("sort", ["newest", "score"]) || ANY.sort,
+      pattern: one("pattern", [...this.sets.keys()]), sort: this.sortOf(query.get("sort")),
     };
+  }
+
+  /** An order by its name in an address: the column, with a minus for its reverse. */
+  sortOf(name) {
+    const known = ["order", "score", "happened", ...this.runs.slots.map(slotKey)];
+    return name === "newest" ? "-order" : known.includes(name?.replace(/^-/, "")) ? name : ANY.sort;
   }
 
   /** How many runs match without one part of the filter, for each part in use. */
@@ -75,20 +81,19 @@ class Filter {
     const outcome = OUTCOMES.indexOf(this.outcome), slot = this.slot === "" ? -1 : Number(this.slot);
     const mode = this.mode === "" ? -1 : Number(this.mode);
     const campaign = this.campaign === "" ? -1 : runs.campaign.texts.indexOf(this.campaign) + 1;
-    const replayed = this.replay && new Set([...runs.replayed.keys()].map((id) => runs.find(id)));
+    const replayed = this.replay && !runs.summary.served && new Set([...runs.replayed.keys()].map((id) => runs.find(id)));
     const pattern = this.pattern && new Set(this.sets.get(this.pattern).runs);
     const found = [];
-    for (const run of this.sort === "score" ? runs.byScore() : runs.order) {
+    for (const run of runs.sortedBy(this.sort)) {
       if (outcome >= 0 && (slot >= 0 ? runs.outcome(run, slot) : runs.worst[run]) !== outcome) continue;
       if (slot >= 0 && runs.outcome(run, slot) === NO_OUTCOME) continue;
       if (mode >= 0 && runs.mode[run] !== mode + 1) continue;
       if (campaign >= 0 && runs.campaign.of[run] !== campaign) continue;
-      if (this.replay && !replayed.has(run)) continue;
+      if (replayed && !replayed.has(run)) continue;
       if (pattern && !pattern.has(run)) continue;
       if (matches && !matches(run)) continue;
       found.push(run);
     }
-    if (this.sort === "newest") found.reverse();
     return found;
   }
 
@@ -113,7 +118,8 @@ class Filter {
         ...modes.map((mode, i) => [i, modeName(mode)])]),
       runs.campaign.texts.length > 1 && choice("campaign", "Campaign", [["", "all campaigns"],
         ...runs.campaign.texts.map((id) => [id, id])]),
-      choice("sort", "Order", [["order", "in order"], ["newest", "newest first"], ["score", "worst first"]]),
+      choice("sort", "Order", [["order", "in order"], ["-order", "newest first"], ["score", "worst first"], ["-score", "best first"], ["happened", "by what happened"], ["-happened", "by what happened, from Z"],
+        ...runs.slots.flatMap((slot) => [[slotKey(slot), `${slot.property}, failed first`], [`-${slotKey(slot)}`, `${slot.property}, failed last`]])]),
     ].filter(Boolean);
     const replay = make("input", { type: "checkbox", "data-filter": "replay", onchange: () => this.choose({ replay: replay.checked }) });
     const told = make("output", { class: "told", "aria-live": "polite" });
@@ -128,7 +134,7 @@ class Filter {
     };
     follow();
     const bar = make("form", { class: "filter", role: "search", onsubmit: (event) => event.preventDefault() },
-      controls, make("label", { class: "check" }, replay, " in 3D"), all, told, pattern);
+      controls, !runs.summary.served && make("label", { class: "check" }, replay, " in 3D"), all, told, pattern);
     return [bar, follow];
   }
 }

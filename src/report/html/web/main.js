@@ -7,7 +7,7 @@ const VIEWS = [["", "Overview"], ["properties", "Properties"], ["modes", "Failur
 const AT_A_TIME = 400;
 
 /** The elements of a view, its reaction to the filter and to another address of the same view, and its clean-up. */
-function view(report, [name, chosen]) {
+function view(report, [name, chosen, other]) {
   switch (name) {
     case "properties": return { parts: properties(report, chosen) };
     case "modes": return { parts: modes(report) };
@@ -16,6 +16,7 @@ function view(report, [name, chosen]) {
     case "map": return tableMap(report);
     case "history": return { parts: trends(report) };
     case "run": return runView(report, chosen ?? "");
+    case "pair": return pairView(report, chosen ?? "", other);
     case "runs": {
       const [bar, follow] = report.filter.bar(), [list, anew] = runList(report), [none, without] = noMatch(report.filter);
       return { parts: [make("h1", {}, "Runs"), bar, none, list], follow: () => { follow(); without(); anew(); }, wide: true };
@@ -28,8 +29,8 @@ function frame(summary, main) {
   const links = VIEWS.map(([name, words]) => make("a", { href: `#/${name}`, "data-view": name }, words));
   const header = make("header", { class: "top" },
     make("a", { class: "mark", href: "#/" }, "actcheck"),
-    make("span", { class: "faint whence" }, `${summary.history} · ${moment(summary.made)}`), themeButton(),
-    make("nav", { "aria-label": "Views" }, links));
+    make("span", { class: "faint whence" }, `${summary.history} · ${moment(summary.made)}`, summary.served && make("output", { class: "live" })), themeButton(),
+    make("nav", { "aria-label": "Views" }, links, summary.served && make("a", { href: "/query" }, "Query")));
   const footer = make("footer", { class: "faint" }, `actcheck ${summary.version} · generated ${summary.made} from ${summary.history}. Drawn in 3D by three.js (MIT).`);
   document.body.prepend(make("a", { class: "skip", href: "#main", onclick: (event) => { event.preventDefault(); main.focus(); } }, "To the report"), header);
   main.after(footer);
@@ -51,7 +52,7 @@ async function main() {
     const address = new Address(filter);
     const report = {
       runs, summary, filter, address,
-      to: (run) => address.of("run", runs.id(run)),
+      to: (run) => address.of("run", report.runs.id(run)),
       open: (run) => { location.hash = report.to(run); },
       list: (change) => addressOf(["runs"], filter.query({ ...ANY, ...change })),
     };
@@ -60,12 +61,14 @@ async function main() {
     filter.listeners.add(lead);
     filter.noted = (replace) => address.note({}, replace);
     let shown = {};
-    const go = (first) => {
+    const go = (first, again = false) => {
       const opened = wayOf(location.hash), { way } = opened;
       address.opened(opened);
+      // The view that is shown has older runs than the filter.
+      if (again) filter.listeners.delete(shown.follow);
       if (FILTERED.has(way[0])) filter.set(filter.ofQuery(opened.query));
       // A step back or forward within a view.
-      if (!first && shown.key === way.join("/")) return shown.arrive?.(opened.query);
+      if (!first && !again && shown.key === way.join("/")) return shown.arrive?.(opened.query);
       filter.listeners.delete(shown.follow);
       shown.end?.();
       shown = { ...view(report, way), key: way.join("/") };
@@ -76,11 +79,12 @@ async function main() {
       }
       element.className = shown.wide ? `wide ${way[0]}` : way[0];
       for (const link of links) {
-        const here = link.dataset.view === (way[0] === "run" ? "runs" : way[0]);
+        const here = link.dataset.view === (["run", "pair"].includes(way[0]) ? "runs" : way[0]);
         if (here) link.setAttribute("aria-current", "page");
         else link.removeAttribute("aria-current");
-        if (here) link.scrollIntoView({ block: "nearest", inline: "center" });
+        if (here && !again) link.scrollIntoView({ block: "nearest", inline: "center" });
       }
+      if (again) return undefined;
       if (way[0] !== "properties") scrollTo(0, 0);
       if (!first) element.focus({ preventScroll: true });
       return undefined;
@@ -88,6 +92,7 @@ async function main() {
     addEventListener("hashchange", () => go(false));
     go(true);
     gatherLetters(runs);
+    if (summary.served) keepLive(report, () => go(false, true));
     document.documentElement.dataset.ready = String(Math.round(performance.now()));
   } catch (error) {
     fill(element, make("h1", {}, "The report can't be read"), make("p", {}, error.message),

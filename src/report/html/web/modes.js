@@ -2,11 +2,10 @@
 
 function modeBars({ summary, list }, shown = Infinity) {
   const modes = summary.findings.failure_modes;
-  const most = Math.max(...modes.map((mode) => mode.share.high), 1e-9);
   return make("ol", { class: "bars" }, modes.slice(0, shown).map((mode, number) => make("li", {},
     make("a", { href: list({ mode: String(number) }) },
       make("span", { class: "name" }, mode.failed.length ? mode.failed.map((iri, i) => [i > 0 && make("i", {}, " + "), breakable(local(iri))]) : make("em", {}, "nothing failed")),
-      rateBar(mode.share, mode.failed.length ? "failed" : "passed", most),
+      rateBar(mode.share, mode.failed.length ? "failed" : "passed"),
       make("span", { class: "faint" }, `${interval(mode.share)} · ${counted(mode.count, "run")}`)))));
 }
 
@@ -20,14 +19,12 @@ function modes(report) {
     make("section", {}, make("h2", {}, "See one of each"), make("ul", { class: "examples" },
       summary.findings.failure_modes.filter((mode) => mode.failed.length).map((mode) => {
         const run = mode.example;
-        const slot = runs.failures(run)[0];
-        return make("li", {}, make("a", { href: to(run) }, runs.id(run)),
-          " ", slot !== undefined && runs.why(run, slot));
+        return make("li", {}, make("a", { href: to(run) }, runs.id(run)), " ", runs.happened(run));
       }))),
     cascades.length > 0 && make("section", {}, make("h2", {}, "Cascades"),
       make("p", { class: "lead" }, "Failures of a later action that are more frequent if an earlier one failed (Fisher's exact test, corrected for all pairs)."),
       scroller("Cascades", make("table", {},
-        make("thead", {}, make("tr", {}, ["when this fails", "then this fails", "in", "otherwise in", "q"].map((word) => make("th", { scope: "col" }, word)))),
+        make("thead", {}, make("tr", {}, ["when this fails", "then this fails", "in", "otherwise in", "adjusted p"].map((word) => make("th", { scope: "col" }, word)))),
         make("tbody", {}, cascades.map(({ first, later, table, q }) => make("tr", {},
           make("td", {}, judged(first)), make("td", {}, judged(later)),
           make("td", {}, rateCell(wilson(table.failed_in, table.failed_in + table.passed_in))),

@@ -1,5 +1,8 @@
 // An orbit camera, controlled by mouse, touch or keys.
 
+/** Largest height of the camera, as an angle: just short of above, where it has no direction. Unit: radians. */
+const STEEPEST = 1.565;
+
 class Orbit {
   constructor(camera, element, changed) {
     Object.assign(this, { camera, element, changed, turn: -0.9, height: 0.5, distance: 2, scale: 1, centre: [0, 0, 0.6], fingers: new Map() });
@@ -12,7 +15,8 @@ class Orbit {
     element.addEventListener("wheel", (event) => { event.preventDefault(); this.zoom(Math.exp(event.deltaY * 0.001)); }, { passive: false });
     element.addEventListener("contextmenu", (event) => event.preventDefault());
     element.addEventListener("keydown", (event) => {
-      const step = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.08], ArrowDown: [0, -0.08] }[event.key];
+      // Arrows alone are the player's.
+      const step = event.shiftKey && { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.08], ArrowDown: [0, -0.08] }[event.key];
       if (step) this.rotate(...step);
       else if (event.key === "+" || event.key === "=") this.zoom(0.9);
       else if (event.key === "-") this.zoom(1.1);
@@ -36,7 +40,7 @@ class Orbit {
 
   rotate(turn, height) {
     this.turn += turn;
-    this.height = Math.min(1.5, Math.max(-0.1, this.height + height));
+    this.height = Math.min(STEEPEST, Math.max(-0.1, this.height + height));
     this.changed();
   }
 

@@ -12,14 +12,13 @@ function outlinesOf(runs) {
 }
 
 async function findOutlines(runs) {
-  const byModel = new Map();
-  for (const [id, number] of runs.replayed) {
+  const byModel = new Map(), found = [];
+  for (const id of runs.summary.served ? Array.from(runs.order, (run) => runs.id(run)) : runs.replayed.keys()) {
     const model = runs.value("surface_model", runs.find(id));
-    if (model && !byModel.has(model) && byModel.size < MOST_OUTLINES) byModel.set(model, number);
+    if (model && !byModel.has(model) && byModel.size < MOST_OUTLINES) byModel.set(model, id);
   }
-  const forms = await formsOf(), found = [];
-  for (const [model, number] of byModel) {
-    const replay = await unpack(`replay-${number}`);
+  for (const [model, id] of byModel) {
+    const { replay, forms } = await replayOf(runs, id);
     const surface = replay.objects.find((object) => object.role === "platform" && object.model === model);
     const body = replay.still?.find((still) => still.name === surface?.id);
     const points = body && outlineOf(forms[body.form]);

@@ -36,9 +36,9 @@ function probability(p) {
 
 function patternCard({ runs, list, open }, property, of, pattern) {
   const facts = [
-    ["runs in it", count(pattern.all.failed_in + pattern.all.passed_in)], ["lift", number(pattern.lift)],
+    ["runs in it", count(pattern.all.failed_in + pattern.all.passed_in)], ["fails", `${pattern.lift.toFixed(1)} times as often as all runs`],
     ["confirmed on", `${count(pattern.held_out.failed_in)} of ${count(pattern.held_out.failed_in + pattern.held_out.passed_in)} held out`],
-    ["q", pattern.q < 1e-4 ? pattern.q.toExponential(0) : number(pattern.q)],
+    ["adjusted p", pattern.q < 1e-4 ? pattern.q.toExponential(0) : number(pattern.q)],
   ];
   return make("section", { class: "card pattern" },
     make("h2", {}, pattern.plain),

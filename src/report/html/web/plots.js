@@ -1,9 +1,9 @@
 // Plots: intervals, distributions, heat maps, trends.
 
-/** A proportion as a bar with its 95 % interval as a whisker. `most`: the share that fills the width. */
-function rateBar(found, outcome, most = 1) {
+/** A proportion as a bar with its 95 % interval as a whisker. The width of every bar is 100 %. */
+function rateBar(found, outcome) {
   if (!found) return make("span", { class: "faint" }, "never decided");
-  const part = (share) => `${(Math.min(1, share / most) * 100).toFixed(2)}%`;
+  const part = (share) => `${(share * 100).toFixed(2)}%`;
   return make("span", { class: `rate ${outcome}`, role: "img", "aria-label": interval(found) },
     make("span", { class: "fill", style: { width: part(found.rate) } }),
     make("span", { class: "whisker", style: { left: part(found.low), width: part(found.high - found.low) } }));
@@ -40,14 +40,17 @@ function histogram(values, unit, label) {
 }
 
 /** A heat map of failures by two parameters. */
-function heatMap(map) {
+function heatMap(map, runs) {
   const cell = ({ runs, failed, failing }) => {
     if (!runs) return make("td", { class: "none" }, "");
     const told = `${failed} of ${runs} failed: ${interval(failing)}`;
     return make("td", { title: told, style: { "--share": failing.rate, "--sure": Math.min(1, 0.35 + runs / 12) } },
       make("span", {}, `${Math.round(failing.rate * 100)}`), make("small", {}, count(runs)));
   };
-  const bare = (name) => (name ?? "").replace(/_(m|rad|kg)$/, " ($1)").replaceAll("_", " ");
+  const bare = (name) => {
+    const { label, unit } = runs.parameter.get(name) ?? { label: (name ?? "").replaceAll("_", " ") };
+    return unit && unit !== "1" ? `${label} (${unit})` : label;
+  };
   return make("figure", { class: "heat" },
     make("figcaption", {}, `% failed by ${bare(map.by[0])}${map.by[1] ? ` (down) and ${bare(map.by[1])} (across)` : ""}; small: runs`),
     scroller(`Failures by ${bare(map.by[0])}`, make("table", {},

@@ -22,7 +22,7 @@ function properties({ runs, summary, list }, chosen) {
       make("div", { class: "maps" },
         margins.some((value) => !Number.isNaN(value)) && make("figure", {},
           make("figcaption", {}, `Margins${unit && unit !== "1" ? ` in ${unit}` : ""}: how far from flipping; below 0 it failed`), histogram(margins, unit, local(property.property))),
-        property.maps.map(heatMap)),
+        property.maps.map((map) => heatMap(map, runs))),
       property.flaky.scenes > 0 && make("p", {}, `Of ${count(property.flaky.scenes)} scenes that were run more than once, ${count(property.flaky.both_ways.length)} both passed and failed.`));
     return card;
   });

@@ -15,22 +15,23 @@ function runView({ runs, summary, filter, address, to }, id) {
   const parts = [
     make("header", { class: "runhead" },
       make("h1", {}, id, " ", badge(worst, worst === "passed" ? "nothing failed" : worst)),
-      make("nav", { "aria-label": "Other runs" }, step(-1, "← previous"), step(1, "next →"), make("a", { class: "button", href: address.of("runs") }, filter.isAny ? "all runs" : "these runs"))),
+      make("nav", { "aria-label": "Other runs" }, step(-1, "← previous"), step(1, "next →"), runs.canPlay(id) && make("a", { class: "button", href: address.of("pair", id) }, "side by side"), make("a", { class: "button", href: address.of("runs") }, filter.isAny ? "all runs" : "these runs"))),
     make("p", { class: "lead" }, `${runs.text(runs.test, run)} · S = ${Number.isNaN(runs.score[run]) ? "–" : runs.score[run].toFixed(2)} · campaign ${runs.text(runs.campaign, run)} · ${moment(runs.told(runs.started, run))} · ${runs.text(runs.status, run)}`),
     summary.contested[id] && make("p", { class: "note" }, `Contested: MuJoCo, or one of its settings, decides ${summary.contested[id].join(", ")} otherwise (actcheck cross-check).`),
     make("div", { class: "run" }, place, details),
+    repeats(summary, id),
     parameterTable(runs, run),
   ];
-  fill(details, runs.slots.map((slot, i) => [slot, i]).filter(([, i]) => failed.includes(i)).map(([slot, i]) => failure(runs, run, slot, i)),
+  fill(details, failed.length > 0 && make("p", { class: "perceived" }, runs.happened(run)), runs.slots.map((slot, i) => [slot, i]).filter(([, i]) => failed.includes(i)).map(([slot, i]) => failure(runs, run, slot, i)),
     allOutcomes(runs, run));
   const known = { end: () => {} };
-  if (!runs.replayed.has(id)) {
-    put(place, notHere(summary, id));
+  if (!runs.canPlay(id)) {
+    put(place, notHere());
     return { parts, end: () => known.end() };
   }
   put(place, make("p", { class: "waiting" }, "Unpacking the run …"));
   watch(known, place, details, { runs, run, id, address }).catch((error) =>
-    fill(place, make("p", { class: "note" }, `Can't show this run in 3D: ${error.message}`), notHere(summary, id)));
+    fill(place, make("p", { class: "note" }, `Can't show this run in 3D: ${error.message}`)));
   return { parts, end: () => known.end(), arrive: (query) => known.arrive?.(secsOf(query)) };
 }
 
@@ -41,7 +42,7 @@ function secsOf(query) {
 }
 
 async function watch(known, place, details, { runs, run, id, address }) {
-  const replay = await unpack(`replay-${runs.replayed.get(id)}`);
+  const { replay, forms } = await replayOf(runs, id);
   let ended = false, shown = null;
   known.end = () => { ended = true; shown?.end(); };
   const seek = (secs) => shown?.seek(secs);
@@ -52,10 +53,8 @@ async function watch(known, place, details, { runs, run, id, address }) {
   if (!replay.courses || !replay.courses.frames) {
     return fill(place, make("p", { class: "note" }, replay.reason ? `The run was ${runs.text(runs.status, run)}: ${replay.reason}` : "The trace of this run is missing or corrupt."));
   }
-  // The moment of the first sentence beside the picture; of a run in which nothing failed, its beginning.
-  const first = replay.actions.flatMap((action) => action.judged).filter(told).map((judged) => judged.stated).find((secs) => typeof secs === "number");
-  const usual = () => first ?? 0;
-  const made = await player(replay, unitsOf(runs), (secs) => address.note({ t: secs.toFixed(2) }));
+  const usual = () => decidedAt(replay, asked);
+  const made = await player([{ replay, forms, slots: unitsOf(runs) }], (secs) => address.note({ t: secs.toFixed(2) }));
   if (ended) return made.end();
   shown = made;
   fill(place, made.element);
@@ -63,6 +62,14 @@ async function watch(known, place, details, { runs, run, id, address }) {
   known.arrive = (secs) => made.seek(secs ?? usual());
   place.dataset.ready = "true";
   return undefined;
+}
+
+/** The moment that decided a run: the first one of its failed properties; of a run in which nothing failed, its beginning. Unit: seconds. */
+function decidedAt(replay, asked) {
+  const action = replay.actions.find(({ judged }) => judged.some(({ outcome, property }) => outcome === "failed" && asked.has(property)));
+  const failed = (action?.judged ?? []).filter(({ outcome, property }) => outcome === "failed" && asked.has(property));
+  const moments = failed.map(({ decided }) => decided).filter((secs) => typeof secs === "number");
+  return moments.length ? Math.min(...moments) : 0;
 }
 
 /** The judged properties with the units of their margins. */
@@ -84,8 +91,8 @@ function explained(action, judged, seek) {
     make("p", {}, judged.witness),
     judged.pressed && make("p", { class: "pressed" }, judged.pressed),
     make("p", { class: "faint" }, judged.margin !== null && `margin ${number(judged.margin)} `,
-      momentButton(judged.stated, "show the moment", seek),
-      judged.event && momentButton(judged.decided, `before it: ${judged.event}`, seek)),
+      judged.event && momentButton(judged.decided, judged.event, seek),
+      momentButton(judged.stated, judged.event ? "the state after the action" : "show the moment", seek)),
     judged.why && make("details", {}, make("summary", {}, "Why"), make("div", { class: "proof", tabindex: "0", role: "group", "aria-label": "Proof" }, judged.why.split("\n").filter((line) => line.trim()).map(proofLine))));
 }
 
@@ -137,13 +144,18 @@ function parameterTable(runs, run) {
   return lists.map(([title, roles]) => {
     const listed = known.filter(([parameter]) => roles.includes(parameter.role));
     return listed.length > 0 && make("section", {}, make("h2", {}, title), make("dl", { class: "parameters" }, listed.map(([parameter, value]) => make("div", { title: parameter.told },
-      make("dt", {}, parameter.name.replace(/_(m|rad|kg|n|s)$/, "").replace(/^sense_/, "").replaceAll("_", " ")), make("dd", {}, typeof value === "number" ? number(value, parameter.unit) : value)))));
+      make("dt", {}, parameter.label), make("dd", {}, typeof value === "number" ? number(value, parameter.unit) : value)))));
   });
 }
 
-/** The commands that show a run that is not in this file. */
-function notHere(summary, id) {
+/** The commands that repeat a run. */
+function repeats(summary, id) {
   const { program, of_history } = summary, asked = `${quoted(id)} ${of_history}`;
-  return make("div", { class: "note card" }, make("p", {}, "This run has no replay in this file, which only has space for some runs of each failure mode and property. To see it, run:"),
-    [`show ${asked} --picture ${quoted(`${id}.png`)}`, `why ${asked}`, `replay ${asked}`].map((words) => make("p", {}, make("code", {}, `${program} ${words}`))));
+  return make("section", { class: "repeats" }, make("h2", {}, "Repeat this run"),
+    [["Simulate it again, and check that it is the same:", `replay ${asked}`], ["Print it, with a picture:", `show ${asked} --picture ${quoted(`${id}.png`)}`], ["Prove its outcomes:", `why ${asked}`]]
+      .map(([told, words]) => [make("p", { class: "faint" }, told), command(`${program} ${words}`)]));
+}
+
+function notHere() {
+  return make("p", { class: "note card" }, "This run has no replay in this file, which only has space for some runs of each failure mode and property. The commands below show it, and actcheck serve plays every run.");
 }

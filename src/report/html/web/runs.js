@@ -24,6 +24,11 @@ class Runs {
     this.judge();
   }
 
+  /** Whether a run can be played back: its replay is in the page, or the server has it. */
+  canPlay(id) {
+    return this.summary.served || this.replayed.has(id);
+  }
+
   /** Runs by campaign, then by index. Alphabetical order of ids would be neither. */
   ordered() {
     const { index, campaign } = this, order = Uint32Array.from({ length: this.count }, (_, run) => run);
@@ -123,6 +128,44 @@ class Runs {
     return this.slots.map((_, slot) => slot).filter((slot) => this.outcome(run, slot) === FAILED);
   }
 
+  /** The objects of a run: `bottle (Bottle)`. Empty if the page lacks them. */
+  objectsOf(run) {
+    const { objects } = this, at = this.detail(run);
+    if (!objects || at < 0) return [];
+    return Array.from(objects.of.subarray(objects.ends[at - 1] ?? 0, objects.ends[at]), (item) => objects.items[item]);
+  }
+
+  /**
+   * What happened in a run, in a sentence: of a failed run, how far off the target was perceived, then the failure that the
+   * action reported, or else the first failed property; of others, the last message.
+   */
+  happened(run) {
+    const failed = this.failures(run), at = this.detail(run);
+    if (!failed.length || at < 0) return failed.map((slot) => this.why(run, slot)).find(Boolean) ?? this.steps.map((step) => this.told(step.message, run)).filter(Boolean).at(-1) ?? "";
+    const step = this.steps[this.slots[failed[0]].step - 1], reported = step?.reported?.[at] === 0 && this.text(step.message, at);
+    return [step?.perceived && this.text(step.perceived, at), reported || failed.map((slot) => this.why(run, slot)).find(Boolean)].filter(Boolean).join("; ");
+  }
+
+  /** Runs in the order of a column: of their ids, `score`, `happened`, or the key of a slot, whose failures come first. A minus before it turns it around. */
+  sortedBy(sort) {
+    const isBackward = sort.startsWith("-"), key = isBackward ? sort.slice(1) : sort;
+    const slot = this.slots.findIndex((one) => slotKey(one) === key);
+    const found = key === "score" ? this.byScore() : key === "happened" ? this.byText() : slot >= 0 ? this.bySlot(slot) : this.order;
+    return isBackward ? [...found].reverse() : found;
+  }
+
+  byText() {
+    this.alphabetical ??= [...this.order].map((run) => [this.happened(run), run]).sort(([a], [b]) => a < b ? -1 : a > b ? 1 : 0).map(([, run]) => run);
+    return this.alphabetical;
+  }
+
+  /** Runs by their outcome of a property: failed ones first, by their margin, and those without the property last. */
+  bySlot(slot) {
+    const rank = { 255: 9, [FAILED]: 0, [BROKEN]: 1, [TIMEOUT]: 2, [PASSED]: 3 }, margins = this.margins[slot];
+    const key = (run) => [rank[this.outcome(run, slot)] ?? 5, margins && !Number.isNaN(margins[run]) ? margins[run] : Infinity];
+    return [...this.order].map((run) => [...key(run), run]).sort((a, b) => a[0] - b[0] || (a[1] === b[1] ? 0 : a[1] - b[1])).map(([, , run]) => run);
+  }
+
   why(run, slot) {
     return this.witness.get(slot * this.count + run) ?? "";
   }
@@ -186,6 +229,7 @@ class Runs {
     if (at >= 0) {
       for (const parameter of this.parameters) if (parameter.values.kind === "texts") words.push(this.text(parameter.values, at));
       for (const step of this.steps) words.push(this.text(step.message, at));
+      words.push(...this.objectsOf(run), this.happened(run));
     }
     for (const slot of this.failures(run)) words.push(this.slots[slot].property, this.why(run, slot));
     return words.join(" ").toLowerCase();

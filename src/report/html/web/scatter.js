@@ -164,7 +164,7 @@ function axes(pen, runs, x, y, equal, width, height, box, outlines) {
       pen.fillText(number(value), along ? px(value) : inner.left - 6, along ? inner.top + inner.height + 15 : py(value) + 4);
     }
   }
-  const named = ({ name, unit }) => `${name.replace(/_(m|rad|kg)$/, "").replaceAll("_", " ")}${unit && unit !== "1" ? ` (${unit})` : ""}`;
+  const named = ({ label, unit }) => `${label}${unit && unit !== "1" ? ` (${unit})` : ""}`;
   pen.textAlign = "center";
   pen.fillText(`${named(xs)} →`, inner.left + inner.width / 2, height - 8);
   pen.save();
@@ -191,11 +191,11 @@ function rangeOf(values, share = 0.04) {
   return [low - room, high + room];
 }
 
-/** Round numbers in a range, about as many as requested. */
+/** Round numbers in a range, about as many as requested, and at least two. */
 function ticks([low, high], wanted) {
   const rough = (high - low) / Math.max(2, wanted), power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 5, 10].map((times) => times * power).find((step) => step >= rough);
   const found = [];
   for (let value = Math.ceil(low / step) * step; value <= high; value += step) found.push(Math.abs(value) < step / 1e6 ? 0 : value);
-  return found;
+  return found.length < 2 && wanted < 12 ? ticks([low, high], 2 * Math.max(2, wanted)) : found;
 }

@@ -26,6 +26,24 @@ function heightOf(part) {
   }
 }
 
+/** The corners of the box around a shape, in the body's frame. */
+function cornersOf(form) {
+  const low = [Infinity, Infinity, Infinity], high = low.map((value) => -value);
+  const most = ({ radius, height, size, low: foot, high: top, kind }) => kind === "box" ? size.map((value) => value / 2) : kind === "tube" ? [Math.max(foot, top), Math.max(foot, top), height / 2]
+    : kind === "sphere" ? [radius, radius, radius] : kind === "capsule" ? [radius, radius, height / 2 + radius] : [radius ?? 0, radius ?? 0, (height ?? 0) / 2];
+  for (const part of form) {
+    const half = part.kind !== "hull" && most(part);
+    for (const point of part.kind === "hull" ? part.points : cornersBetween(half.map((value) => -value), half)) {
+      placed(part.at, point).forEach((value, axis) => { low[axis] = Math.min(low[axis], value); high[axis] = Math.max(high[axis], value); });
+    }
+  }
+  return cornersBetween(low, high);
+}
+
+function cornersBetween(low, high) {
+  return [0, 1, 2, 3, 4, 5, 6, 7].map((corner) => low.map((value, axis) => (corner >> axis & 1 ? high[axis] : value)));
+}
+
 function tube(three, { low, high, wall, height }) {
   const corner = (radius, y) => new three.Vector2(Math.max(radius, 1e-4), y);
   return new three.LatheGeometry([corner(low, -height / 2), corner(high, height / 2), corner(high - wall, height / 2),

@@ -6,6 +6,11 @@ const AROUND_M = 0.3;
 const BESIDE_SECS = 0.5;
 /** Things further than this from the centre of the view have no label. Unit: metres. */
 const LABELLED_M = 1.5;
+/** Width of the star at a contact, at any distance: as wide as this at 1 m. Unit: metres. */
+const STAR_M = 0.08;
+/** Vertical angle of the picture, and of that of the robot's camera. Unit: degrees. */
+const VIEW_DEG = 38;
+const CAMERA_DEG = 44;
 /** Angle between the camera's direction and the robot's reach. Unit: radians. */
 const ASIDE = 1.95;
 
@@ -20,13 +25,16 @@ class Stage {
     this.renderer.shadowMap.type = three.PCFShadowMap;
     this.renderer.toneMapping = three.ACESFilmicToneMapping;
     this.scene = new three.Scene();
-    this.camera = new three.PerspectiveCamera(38, 1, 0.02, 60);
+    this.camera = new three.PerspectiveCamera(VIEW_DEG, 1, 0.02, 60);
     this.camera.up.set(0, 0, 1);
     this.lights();
     this.labels = new Labels();
     this.fill(replay, forms);
     this.name(replay, forms);
-    this.orbit = new Orbit(this.camera, canvas, () => this.draw());
+    this.orbit = new Orbit(this.camera, canvas, () => { this.eye = null; this.draw(); });
+    this.sight = sightOf(course, replay.camera);
+    /** The views that this run has. */
+    this.views = ["side", "top", this.course.grasp && "hand", this.sight && "camera"].filter(Boolean);
     this.begin(0);
   }
 
@@ -77,22 +85,27 @@ class Stage {
     if (this.pressed) scene.add(this.pressed.mark);
   }
 
-  /** Labels for the hand and all things, and for the gap between hand and target. */
+  /** Labels for the hardest contact, the hand and all things, and for the gap between hand and target. */
   name(replay, forms) {
-    const { course, labels } = this, above = (form) => form.reduce((most, part) => Math.max(most, part.at[2] + heightOf(part) / 2), 0) + 0.02;
+    const { course, labels, pressed } = this, above = (form) => form.reduce((most, part) => Math.max(most, part.at[2] + heightOf(part) / 2), 0) + 0.02;
     const near = (point) => point && apart(point, this.centre ?? point) < LABELLED_M ? point : null;
     const target = this.target && course.slot.get(this.target);
     this.form = target !== undefined && forms[course.tracks[target].form];
+    if (pressed) {
+      const still = replay.still.find(({ name }) => name === pressed.thing), track = course.slot.get(pressed.thing);
+      const form = forms[(still ?? course.tracks[track])?.form], corners = form && cornersOf(form);
+      const pose = (secs) => still?.at ?? course.pose(track, secs);
+      this.tag = labels.add("pressed", pressed.label, () => pressed.at, (secs) => corners && corners.map((corner) => placed(pose(secs), corner)), true);
+    }
     this.told = labels.add("gap", "", () => this.middle);
+    const corners = new Map(course.tracks.map((track, slot) => [slot, track.name.startsWith("robot/") ? [] : cornersOf(forms[track.form])]));
+    const cornersAt = (slot) => (secs) => { const pose = course.pose(slot, secs); return corners.get(slot).map((corner) => placed(pose, corner)); };
     const body = (track, slot) => labels.add(track.role === "target" ? "target" : "other", track.name, (secs) => {
       const [x, y, z] = course.position(track.name, secs);
       return near([x, y, z + above(forms[course.tracks[slot].form])]);
-    });
+    }, cornersAt(slot));
     const things = course.tracks.map((track, slot) => [track, slot]).filter(([track]) => !track.name.startsWith("robot/"));
-    things.forEach(([track]) => labels.spare((secs) => {
-      const [x, y, z] = course.position(track.name, secs);
-      return [[x, y, z], [x, y, z + above(forms[track.form])]];
-    }));
+    things.forEach(([, slot]) => labels.spare(cornersAt(slot)));
     things.filter(([track]) => track.role === "target").forEach(([track, slot]) => body(track, slot));
     if (course.grasp) labels.add("hand", "gripper", (secs) => { const [x, y, z] = course.hand(secs); return [x, y, z + 0.06]; });
     things.filter(([track]) => track.role !== "target").forEach(([track, slot]) => body(track, slot));
@@ -118,27 +131,23 @@ class Stage {
     this.told.textContent = inUnit(closest.distance, "m");
   }
 
-  /** A star with its label at the hardest contact. It is visible through bodies. */
-  mark({ at, label }) {
-    const { three } = this, width = 1024, height = 128, middle = [64, 64];
-    const picture = make("canvas", { width, height }), pen = picture.getContext("2d");
+  /** A star at the hardest contact. It is visible through bodies; its words are among the labels, beside the thing. */
+  mark({ at }) {
+    const { three } = this, size = 128, middle = size / 2;
+    const picture = make("canvas", { width: size, height: size }), pen = picture.getContext("2d");
     pen.beginPath();
     for (let step = 0; step < 16; step++) {
       const angle = step * Math.PI / 8, reach = step % 2 ? 22 : 48;
-      pen.lineTo(middle[0] + reach * Math.sin(angle), middle[1] - reach * Math.cos(angle));
+      pen.lineTo(middle + reach * Math.sin(angle), middle - reach * Math.cos(angle));
     }
     pen.closePath();
-    pen.font = "600 44px system-ui, sans-serif";
     Object.assign(pen, { fillStyle: "#d3301f", strokeStyle: "#fff", lineWidth: 7, lineJoin: "round" });
     pen.stroke();
     pen.fill();
-    pen.strokeText(label, 124, 79, width - 130);
-    pen.fillText(label, 124, 79, width - 130);
     const map = new three.CanvasTexture(picture);
     map.colorSpace = three.SRGBColorSpace;
-    const sprite = new three.Sprite(new three.SpriteMaterial({ map, depthTest: false, transparent: true, toneMapped: false, fog: false }));
-    sprite.center.set(middle[0] / width, middle[1] / height);
-    sprite.scale.set(1.5, 1.5 * height / width, 1);
+    const sprite = new three.Sprite(new three.SpriteMaterial({ map, depthTest: false, transparent: true, toneMapped: false, fog: false, sizeAttenuation: false }));
+    sprite.scale.set(STAR_M, STAR_M, 1);
     sprite.position.set(...at);
     sprite.renderOrder = 1;
     return sprite;
@@ -179,14 +188,13 @@ class Stage {
 
   /** The distance from which a sphere fills the picture. */
   away(radius) {
-    const up = this.camera.fov * Math.PI / 360, across = Math.atan(Math.tan(up) * this.camera.aspect);
+    const up = VIEW_DEG * Math.PI / 360, across = Math.atan(Math.tan(up) * this.camera.aspect);
     return radius / Math.sin(Math.min(up, across));
   }
 
   /** The view of a moment: from the side of the robot's reach, on which fewer things are in the way. */
   begin(secs) {
-    const robot = this.course.robot(secs) ?? [0, 0, 0], target = (this.target && this.course.position(this.target, secs)) ?? [1, 0, 0];
-    const way = Math.atan2(target[1] - robot[1], target[0] - robot[0]);
+    const target = (this.target && this.course.position(this.target, secs)) ?? [1, 0, 0], way = this.way(secs);
     const others = this.course.tracks.filter((track) => !track.name.startsWith("robot/") && track.name !== this.target).map((track) => this.course.position(track.name, secs));
     const hidden = (turn) => others.filter(([x, y]) => {
       const [ahead, aside] = [(x - target[0]) * Math.cos(turn) + (y - target[1]) * Math.sin(turn), (y - target[1]) * Math.cos(turn) - (x - target[0]) * Math.sin(turn)];
@@ -194,6 +202,21 @@ class Stage {
     }).length;
     const turn = hidden(way + ASIDE) < hidden(way - ASIDE) ? way + ASIDE : way - ASIDE, { centre, radius } = this.focus(secs);
     Object.assign(this.orbit, { turn, height: 0.46, distance: this.away(radius), centre });
+  }
+
+  /** Looks from the side as at first, from above, along the hand, or from the robot's camera. Turning the picture leaves the last two. */
+  look(view, secs) {
+    Object.assign(this.orbit, { held: false, scale: 1 });
+    this.eye = view === "hand" ? (at) => handEye(this.course, at) : view === "camera" ? this.sight : null;
+    this.begin(secs);
+    if (view === "top") Object.assign(this.orbit, { turn: this.way(secs) + Math.PI, height: STEEPEST });
+    this.show(secs);
+  }
+
+  /** Direction from the robot to the target. Unit: radians. */
+  way(secs) {
+    const robot = this.course.robot(secs) ?? [0, 0, 0], target = (this.target && this.course.position(this.target, secs)) ?? [1, 0, 0];
+    return Math.atan2(target[1] - robot[1], target[0] - robot[0]);
   }
 
   theme() {
@@ -214,7 +237,9 @@ class Stage {
     });
     if (this.pressed) {
       const [from, to] = this.pressed.secs;
-      this.pressed.mark.material.opacity = secs >= from && secs <= to ? 1 : 0.35;
+      const lasts = secs >= from && secs <= to;
+      this.pressed.mark.material.opacity = lasts ? 1 : 0.35;
+      this.tag.classList.toggle("over", !lasts);
     }
     for (const { thing, box } of this.boxes) {
       // Of several looks at a thing, the last one so far.
@@ -248,7 +273,19 @@ class Stage {
       this.camera.updateProjectionMatrix();
       if (!this.orbit.held) this.orbit.distance = this.away(this.focus(this.secs ?? 0).radius);
     }
-    this.orbit.place();
+    const eye = this.eye?.(this.secs ?? 0), angle = eye?.angle ?? VIEW_DEG;
+    if (this.camera.fov !== angle) {
+      this.camera.fov = angle;
+      this.camera.updateProjectionMatrix();
+    }
+    if (eye) {
+      this.camera.up.set(...eye.up);
+      this.camera.position.set(...eye.from);
+      this.camera.lookAt(...eye.to);
+    } else {
+      this.camera.up.set(0, 0, 1);
+      this.orbit.place();
+    }
     this.renderer.render(this.scene, this.camera);
     this.labels.element.hidden = !this.labels.shown;
     if (this.labels.shown) this.labels.place(this.three, this.camera, this.secs ?? 0, width, height);
@@ -256,9 +293,10 @@ class Stage {
 
   /** Renders a moment as a picture, with its own camera. */
   picture(secs, into) {
-    const { orbit } = this, before = [this.secs ?? 0, this.near], view = { centre: orbit.centre, distance: orbit.distance, scale: orbit.scale, held: orbit.held };
+    const { orbit, eye } = this, before = [this.secs ?? 0, this.near], view = { centre: orbit.centre, distance: orbit.distance, scale: orbit.scale, held: orbit.held };
     Object.assign(orbit, { scale: 1, held: false });
     this.near = false;
+    this.eye = null;
     this.show(secs, true);
     this.paint();
     const [width, height] = [this.canvas.width, this.canvas.height], pen = into.getContext("2d");
@@ -267,6 +305,7 @@ class Stage {
     pen.drawImage(this.canvas, 0, 0, into.width, into.height);
     Object.assign(orbit, view);
     this.near = before[1];
+    this.eye = eye;
     this.show(before[0], false);
   }
 

@@ -54,7 +54,7 @@ function timeline(replay, course, signals, thresholds, seek) {
 function timelineOf(replay, course, signals, thresholds, seconds, width, seek) {
   const rows = lanes(replay, seconds), left = width < 600 ? 104 : 150, inner = width - left - 10, letters = width < 600 ? 17 : 26;
   const x = (secs) => left + (seconds ? secs / seconds : 0) * inner;
-  const top = 42, below = top + rows.length * LANE + 4, height = below + signals.length * SIGNAL + 18;
+  const top = 54, below = top + rows.length * LANE + 4, height = below + signals.length * SIGNAL + 18;
   const marks = replay.actions.flatMap((action) => action.judged).filter((judged) => typeof judged.stated === "number");
   const now = make("line", { class: "now", x1: left, x2: left, y1: 0, y2: height - 16 });
   const [plots, follow] = signalRows(signals, thresholds, course, { x, left, width, top: below });
@@ -88,10 +88,21 @@ function actionBar(action, i, x) {
     make("rect", { class: `action of${i % 6}`, x: x(action.start), y: 2, width: Math.max(2, length - 1), height: 16, rx: 3 },
       make("title", { svg: true }, `${local(action.action)}: ${number(action.seconds, "s")}`)),
     make("text", { class: "name", x: x(action.start) + 5, y: 14 }, length > 40 ? local(action.action) : ""),
-    (action.phases ?? []).map(([name, start], j, all) => {
-      const [from, to] = [x(action.start + start), x(action.start + (all[j + 1]?.[1] ?? action.seconds))];
-      return [
-        make("line", { class: "phase", x1: from, x2: from, y1: 20, y2: 34 }, make("title", { svg: true }, name)),
-        to - from > name.length * 5.8 + 6 && make("text", { class: "small", x: from + 3, y: 31 }, name)];
-    })];
+    phaseNames((action.phases ?? []).map(([name, start]) => [name, x(action.start + start)]), x(action.start + action.seconds))];
+}
+
+/** Height of a row of phase names. Unit: pixels. */
+const PHASE_ROW = 12;
+
+/** The names of phases in two rows, each where it has room; `…` stands for names without any. */
+function phaseNames(phases, end) {
+  const ends = [-Infinity, -Infinity];
+  return phases.map(([name, from], j) => {
+    const room = (row) => from + 3 >= ends[row] && from + 3 + name.length * LETTER <= (row ? end : phases[j + 1]?.[1] ?? end);
+    const row = [0, 1].find(room) ?? (from + 3 >= ends[1] ? 1 : -1), fits = row >= 0 && room(row), words = fits ? name : "…";
+    if (row >= 0) ends[row] = from + 3 + words.length * LETTER + 3;
+    return [
+      make("line", { class: "phase", x1: from, x2: from, y1: 20, y2: 22 + PHASE_ROW * 2 }, make("title", { svg: true }, name)),
+      row >= 0 && make("text", { class: "small", x: from + 3, y: 30 + PHASE_ROW * row }, words, make("title", { svg: true }, name))];
+  });
 }

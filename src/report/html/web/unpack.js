@@ -10,7 +10,11 @@ async function inflated(id) {
   }
   const element = document.getElementById(`data-${id}`);
   if (!element) throw new Error(`the part ${id} is not in this file`);
-  const letters = element.textContent;
+  return inflatedOf(element.textContent);
+}
+
+/** The bytes of a part, from its letters. */
+function inflatedOf(letters) {
   const bytes = Uint8Array.fromBase64 ? Uint8Array.fromBase64(letters)
     : Uint8Array.from(atob(letters), (letter) => letter.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
@@ -19,12 +23,19 @@ async function inflated(id) {
 
 /** The text of a part. */
 async function unpackText(id) {
-  return new TextDecoder().decode(await inflated(id));
+  return textOf(await inflated(id));
+}
+
+function textOf(buffer) {
+  return new TextDecoder().decode(buffer);
 }
 
 /** The header of a part, with its array descriptors replaced by the arrays. */
 async function unpack(id) {
-  const buffer = await inflated(id);
+  return unpacked(await inflated(id));
+}
+
+function unpacked(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
   const body = 4 + length;
