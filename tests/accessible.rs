@@ -203,7 +203,7 @@ const FINDINGS: &str = "axe.run(document, { resultTypes: ['violations'] }).then(
     rule.nodes.map((node) => [rule.id, node.target.join(' '), (node.any[0] ?? node.all[0] ?? node.none[0])?.message])))";
 
 /// Opens a page in both themes and on a phone and a desktop, and asks axe-core each time.
-fn no_findings(browser: &mut Chromium, name: &str) {
+pub fn no_findings(browser: &mut Chromium, name: &str) {
     for theme in ["light", "dark"] {
         browser.theme(theme);
         for width in [420, 1440] {

@@ -88,6 +88,7 @@ mod pictures;
 mod place;
 mod plausible;
 mod preconditions;
+mod program_side;
 mod proofs;
 mod proposals;
 mod protocol;

@@ -21,7 +21,7 @@ model_list = [\"glass\"]
 ";
 
 /// A folder with a configuration `c.toml` whose program is one of `tests/protocol/`.
-fn project(program: &str, tests: &str, runs: u32, skill: &str) -> tempfile::TempDir {
+pub fn project(program: &str, tests: &str, runs: u32, skill: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     for file in ["wire.py", program] {
         std::fs::copy(
@@ -37,7 +37,7 @@ fn project(program: &str, tests: &str, runs: u32, skill: &str) -> tempfile::Temp
     folder
 }
 
-fn run(folder: &Path, arguments: &[&str]) -> (i32, Value, String) {
+pub fn run(folder: &Path, arguments: &[&str]) -> (i32, Value, String) {
     let mut all = vec!["run", "c.toml", "--format", "json"];
     all.extend(arguments);
     let output = actcheck(folder, &all);

@@ -103,7 +103,7 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
         )?;
         runs.retain(|row| found.contains(&row.run));
     }
-    // A list of failures for people says what failed instead of all values.
+    // A list of failures for people names the failed properties instead of all values.
     let all = !args.failed || args.format != Format::Text;
     // Most campaigns have neither, so empty columns are hidden.
     let repeated = runs.iter().any(|row| row.repetition.is_some());

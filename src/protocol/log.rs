@@ -1,4 +1,4 @@
-//! Records the part of a program in a run: what it printed, commanded and asked, at simulated times.
+//! Records the part of a program in a run: its output, commands and questions, at simulated times.
 
 use std::fmt;
 use std::sync::Arc;

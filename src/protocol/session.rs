@@ -298,7 +298,7 @@ impl Session {
             }
         };
         let received = self.wire.receive(limit_secs, &mut watch);
-        // What it printed before the message was printed at the same simulated time.
+        // Lines before the message were printed at the same simulated time.
         self.log.print(self.process.output.take());
         received.map_err(|fault| self.cause(fault))
     }

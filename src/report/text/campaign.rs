@@ -10,7 +10,7 @@ use crate::text::{Page, by_action, command, fit, fitted, regressions_text, ruled
 use crate::{CampaignSummary, PropertyLine, Proportion, RateBounds, RunSummary};
 use actcheck_analysis::Sampling;
 use actcheck_base::{Judgement, Outcome, ShellLine, names};
-use actcheck_history::SkillRecord;
+use actcheck_history::{RunStatus, SkillRecord};
 
 /// Maximum number of rows in the table of runs. The text names the command that lists the rest.
 const RUNS_SHOWN: usize = 40;
@@ -422,6 +422,14 @@ fn failed_of(run: &RunSummary) -> impl Iterator<Item = (&str, &Judgement)> {
     })
 }
 
+/// How a run ended that did not complete.
+fn ended(status: RunStatus) -> &'static str {
+    match status {
+        RunStatus::Timeout => "timed out",
+        other => other.word(),
+    }
+}
+
 impl Kind<'_> {
     /// `3 runs (20 % [7–45]) fail CloseObject + MovedObject`
     fn title(&self, summary: &CampaignSummary) -> String {
@@ -429,8 +437,8 @@ impl Kind<'_> {
         let runs = if count == 1 { "run" } else { "runs" };
         let spoilt = self.runs.iter().find(|run| run.reason.is_some());
         let words = match (spoilt, self.failed.is_empty()) {
-            (Some(run), true) => return format!("{count} {runs} {}", run.status.word()),
-            (Some(run), false) => format!("{} and ", run.status.word()),
+            (Some(run), true) => return format!("{count} {runs} {}", ended(run.status)),
+            (Some(run), false) => format!("{} and ", ended(run.status)),
             (None, _) => String::new(),
         };
         let mode = summary.failure_modes.iter().find(|mode| {
@@ -488,11 +496,11 @@ fn failures_text(summary: &CampaignSummary) -> String {
                     } else {
                         String::new()
                     };
-                    format!("{action}{}", judgement.witness)
+                    format!("{action}{}", shortened(&judgement.witness))
                 }
                 (None, None) => String::new(),
             };
-            let _ = writeln!(out, "  {}  {}", run.id, shortened(&reason));
+            let _ = writeln!(out, "  {}  {reason}", run.id);
         }
     }
     if kinds.len() > KINDS_SHOWN {
@@ -526,7 +534,6 @@ fn failures_text(summary: &CampaignSummary) -> String {
 mod tests {
     use super::*;
     use crate::summary::campaign_samples::{campaign, run};
-    use actcheck_history::RunStatus;
 
     #[test]
     fn a_failed_property_is_described_with_a_command_for_details() {

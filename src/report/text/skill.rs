@@ -51,10 +51,10 @@ pub fn skill_text(trace: &Trace, page: Page) -> String {
         (log.lines_left_out, "printed lines"),
         (log.others_left_out, "commands and questions"),
     ];
-    for (count, what) in left_out.into_iter().filter(|(count, _)| *count > 0) {
+    for (count, noun) in left_out.into_iter().filter(|(count, _)| *count > 0) {
         let _ = writeln!(
             out,
-            "  {count} {what} in the middle of the run are not kept"
+            "  {count} {noun} in the middle of the run are not kept"
         );
     }
     out.push_str(&joints(trace, page));

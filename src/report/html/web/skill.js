@@ -1,4 +1,4 @@
-// The side of a user's program, below its replay and in step with it: what it printed, commanded and asked.
+// The side of a user's program, below its replay and in step with it: its output, commands and questions.
 
 /** Entries that are shown at once before the list is asked for more. */
 const MOST_ENTRIES = 400;
@@ -58,7 +58,7 @@ function commanded({ commands, secs, until, targets }) {
       default: return `${kind} ${shown}`;
     }
   });
-  const what = words.length ? `${commands === 1 ? "commands" : `${commands} commands, at last`} ${words.join(", ")}`
+  const deed = words.length ? `${commands === 1 ? "commands" : `${commands} commands, at last`} ${words.join(", ")}`
     : commands === 1 ? "waits" : `${commands} commands without new targets`;
-  return `${what}, ${(until - secs).toFixed(2)}${THIN}s`;
+  return `${deed}, ${(until - secs).toFixed(2)}${THIN}s`;
 }
