@@ -1,7 +1,7 @@
 //! The light of a scene and the colours of its objects, for colour images. They do not affect the
 //! simulation.
 
-use crate::{Choice, ChoiceName, Colour, Stream};
+use crate::{Choice, ChoiceName, Choices, Colour, Stream};
 
 /// A pattern of a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -51,6 +51,63 @@ pub struct DecorRanges {
     pub table_colours: Vec<Colour>,
     /// Whether objects have random colours.
     pub random_object_colours: bool,
+}
+
+impl DecorRanges {
+    /// No range: no choice.
+    pub const PLAIN: Self = Self {
+        light_azimuth_rad: None,
+        light_elevation_rad: None,
+        light_brightness: None,
+        ambient: None,
+        table_textures: Vec::new(),
+        table_colours: Vec::new(),
+        random_object_colours: false,
+    };
+
+    /// Chooses the light and colours of a scene, from a stream of their own.
+    pub fn choose(&self, choices: &mut Choices) {
+        choices.apart(|choices| self.choose_from(choices));
+    }
+
+    fn choose_from(&self, choices: &mut Choices) {
+        let plain = Decor::PLAIN;
+        for (name, range, nominal) in [
+            (
+                ChoiceName::LightAzimuth,
+                self.light_azimuth_rad,
+                plain.light_azimuth_rad,
+            ),
+            (
+                ChoiceName::LightElevation,
+                self.light_elevation_rad,
+                plain.light_elevation_rad,
+            ),
+            (
+                ChoiceName::LightBrightness,
+                self.light_brightness,
+                plain.light_brightness,
+            ),
+            (ChoiceName::LightAmbient, self.ambient, plain.ambient),
+        ] {
+            if let Some((low, high)) = range {
+                choices.real(name, low, high, nominal);
+            }
+        }
+        let textures = self.table_textures.iter().map(|of| of.word().to_owned());
+        let colours = self.table_colours.iter().map(|of| of.hex());
+        for (name, candidates) in [
+            (ChoiceName::TableTexture, textures.collect::<Vec<_>>()),
+            (ChoiceName::TableColour, colours.collect()),
+        ] {
+            if !candidates.is_empty() {
+                choices.candidate(name, candidates);
+            }
+        }
+        if self.random_object_colours {
+            choices.index(ChoiceName::ObjectColours, Decor::SEEDS);
+        }
+    }
 }
 
 /// The light of a scene and the colours of its objects.
@@ -171,7 +228,6 @@ impl Colour {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Choices;
 
     #[test]
     fn colours_are_written_as_they_are_read() {
@@ -200,6 +256,36 @@ mod tests {
         );
         assert_eq!(decor.table_colour, Some(Colour([16, 32, 48])));
         assert_eq!(decor.object_colour("mug_1"), None);
+    }
+
+    /// Scenes and noise of a seed are the same with and without ranges of light.
+    #[test]
+    fn the_light_is_chosen_from_a_stream_of_its_own() {
+        let ranges = DecorRanges {
+            light_azimuth_rad: Some((0.0, 6.0)),
+            table_textures: Texture::ALL.to_vec(),
+            random_object_colours: true,
+            ..DecorRanges::PLAIN
+        };
+        let values = |ranges: &DecorRanges| {
+            let mut choices = Choices::random(7, 3).with_noise(8, 3);
+            let first = choices.real("yaw".into(), -1.0, 1.0, 0.0);
+            ranges.choose(&mut choices);
+            let second = choices.real("x".into(), -1.0, 1.0, 0.0);
+            choices.begin_noise();
+            let third = choices.normal("noise".into(), 0.1);
+            ([first, second, third], choices)
+        };
+        let (plain, _) = values(&DecorRanges::PLAIN);
+        let (with, choices) = values(&ranges);
+        assert_eq!(plain, with);
+        assert_eq!(choices.made().len(), 6);
+        let chosen = choices.made()[1].value / 6.0;
+        assert!((chosen - (plain[1] + 1.0) / 2.0).abs() > 1e-6);
+        let mut again = Choices::recorded(choices.made());
+        again.real("yaw".into(), -1.0, 1.0, 0.0);
+        ranges.choose(&mut again);
+        assert_eq!(Decor::of(again.made()), Decor::of(choices.made()));
     }
 
     #[test]

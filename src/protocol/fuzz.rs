@@ -18,6 +18,7 @@ const MESSAGES: [&str; 9] = [
     r#"{"type": "command", "base_velocity": [0.1, 0.0, 0.2], "gripper": {"opening_m": 0.08, "force_n": 20}, "head": {"pan_rad": 0.1}}"#,
     r#"{"type": "ask", "what": "objects"}"#,
     r#"{"type": "ask", "what": "depth", "of": "glass_1"}"#,
+    r#"{"type": "ask", "what": "rgb"}"#,
     r#"{"type": "end", "succeeded": true, "message": "done"}"#,
     r#"{"type": "end", "succeeded": false, "perceived": [{"pose": {"position_m": [0, 0, 1], "quaternion_xyzw": [0, 0, 0, 1]},
         "size_m": [0.1, 0.1, 0.2], "category": "http://actions#Cup"}]}"#,

@@ -168,6 +168,7 @@ pub struct Ask {
 #[serde(rename_all = "snake_case")]
 pub enum What {
     Depth,
+    Rgb,
     Cloud,
     Objects,
 }

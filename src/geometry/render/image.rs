@@ -65,6 +65,24 @@ pub struct RgbImage {
     pub bytes: Vec<u8>,
 }
 
+impl RgbImage {
+    /// Returns the image as a PNG file. Empty if it has no pixels.
+    pub fn png(&self) -> Vec<u8> {
+        let size = |pixels: usize| u32::try_from(pixels).unwrap_or(0);
+        let mut file = Vec::new();
+        let mut encoder = png::Encoder::new(&mut file, size(self.width), size(self.height));
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let written = encoder
+            .write_header()
+            .and_then(|mut writer| writer.write_image_data(&self.bytes));
+        match written {
+            Ok(()) => file,
+            Err(_) => Vec::new(),
+        }
+    }
+}
+
 /// Draws bodies as a lens at a pose sees them. Frame: world.
 pub fn draw(lens: Lens, eye: &Isometry3<f64>, bodies: &[Drawn<'_>], light: &Light) -> RgbImage {
     let fine = Lens {
