@@ -15,9 +15,7 @@ use std::sync::Arc;
 use actcheck::base::{Digest, Source};
 use actcheck::campaign::Env;
 use actcheck::config::Overrides;
-use actcheck::data::{
-    Choice, ChoiceKind, ChoiceName, Choices, Decor, Scene, Shape, Texture,
-};
+use actcheck::data::{Choice, ChoiceKind, ChoiceName, Choices, Decor, Scene, Shape, Texture};
 use actcheck::world::{DepthImage, World};
 use actcheck::{scenario, world};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};

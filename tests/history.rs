@@ -8,8 +8,9 @@ use std::time::Duration;
 
 use actcheck::base::{Diagnostics, Judgement, Outcome, RunFacts, Source, Term, digest_of, names};
 use actcheck::data::{
-    ActionEnd, Camera, Choice, ChoiceKind, CupState, DecorRanges, Hand, LinkFrame, ObjectModel, Odometry,
-    Physics, Pose, Quality, RobotCore, RobotProfile, RobotStart, Role, Scene, SceneObject, Sensing,
+    ActionEnd, Camera, Choice, ChoiceKind, CupState, DecorRanges, Hand, LinkFrame, ObjectModel,
+    Odometry, Physics, Pose, Quality, RobotCore, RobotProfile, RobotStart, Role, Scene,
+    SceneObject, Sensing,
 };
 use actcheck::facts::extract;
 use actcheck::history::RunScene;

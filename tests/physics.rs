@@ -7,8 +7,8 @@ use std::sync::Arc;
 use actcheck::actions::{ActionCall, perform};
 use actcheck::base::Files;
 use actcheck::data::{
-    ActionEnd, BodyState, Budget, Camera, Choices, DecorRanges, ObjectModel, Odometry, Part, Physics, Pose,
-    RobotProfile, RobotStart, Role, Scene, SceneObject, Sensing, Shape, Trace,
+    ActionEnd, BodyState, Budget, Camera, Choices, DecorRanges, ObjectModel, Odometry, Part,
+    Physics, Pose, RobotProfile, RobotStart, Role, Scene, SceneObject, Sensing, Shape, Trace,
 };
 use actcheck::world::{GRAVITY, Poison, Shortcuts, World, build};
 

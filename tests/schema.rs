@@ -78,7 +78,7 @@ light_elevation_rad = [0.6, 1.5]
 light_brightness = [0.4, 0.9]
 ambient = [0.2, 0.5]
 table_textures = ["plain", "checker", "wood"]
-table_colours = ["#b0865c"]
+table_colours = ['#b0865c']
 random_object_colours = true
 
 [case]

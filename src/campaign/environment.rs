@@ -4,12 +4,12 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::appearance::skins;
 use crate::budget::runs_per_test;
 use crate::case::check_case;
 use crate::relations::RelationRules;
 use crate::requirement::Requirement;
 use crate::rule_set::recorded_rules;
-use crate::appearance::skins;
 use crate::{plausible, solids};
 use actcheck_actions as actions;
 use actcheck_base::{Diagnostic, Diagnostics, Source, program_digest};

@@ -3,12 +3,11 @@
 use std::collections::BTreeMap;
 
 use nalgebra::Isometry3;
+use rayon::prelude::*;
 
 use crate::Env;
 use actcheck_base::Diagnostics;
-use actcheck_data::{
-    Camera, Choice, Decor, Form, ObjectModel, Part, Pose, Role, Trace, bounds,
-};
+use actcheck_data::{Camera, Choice, Decor, Form, ObjectModel, Part, Pose, Role, Trace, bounds};
 use actcheck_history::{History, RunDetail};
 use actcheck_world::{Mount, RgbImage, Stage, StagedObject};
 
@@ -111,6 +110,14 @@ impl CampaignPictures {
 }
 
 impl RunPictures<'_> {
+    /// Draws the images of several frames, in this order, on all cores; nothing if one can't be
+    /// drawn.
+    pub fn frames(&self, frames: &[usize]) -> Vec<RunPicture> {
+        let drawn: Option<Vec<RunPicture>> =
+            frames.par_iter().map(|frame| self.frame(*frame)).collect();
+        drawn.unwrap_or_default()
+    }
+
     /// Draws the image of a frame of the trace. `None` if there is no such frame, or the trace has
     /// no pose of the camera.
     pub fn frame(&self, frame: usize) -> Option<RunPicture> {

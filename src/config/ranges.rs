@@ -177,7 +177,10 @@ fn read_camera(root: &mut Table, found: &mut Diagnostics) -> (Camera, DecorRange
         table.number("grazing_rad", 0.0..=1.5),
     );
     // With a fifth of full brightness as noise, nothing can be recognised.
-    set(&mut camera.image_noise, table.number("image_noise", 0.0..=0.2));
+    set(
+        &mut camera.image_noise,
+        table.number("image_noise", 0.0..=0.2),
+    );
     let decor = read_decor(&mut table);
     table.finish(found);
     (camera, decor)
@@ -223,7 +226,10 @@ fn read_words<T>(
             None => table.fault(
                 "C004",
                 word.span,
-                format!("`{key}` must be a list of {expected}, but this is `{}`", word.value),
+                format!(
+                    "`{key}` must be a list of {expected}, but this is `{}`",
+                    word.value
+                ),
                 format!("write {expected}"),
             ),
         }

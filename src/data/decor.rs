@@ -184,9 +184,9 @@ impl Decor {
 
 /// Random numbers of a text and a seed.
 fn of_text(seed: u64, text: &str) -> Stream {
-    let key = text.bytes().fold(seed, |key, byte| {
-        Stream::new(key).bits(u64::from(byte))
-    });
+    let key = text
+        .bytes()
+        .fold(seed, |key, byte| Stream::new(key).bits(u64::from(byte)));
     Stream::new(key)
 }
 
@@ -232,9 +232,14 @@ mod tests {
     #[test]
     fn colours_are_written_as_they_are_read() {
         for text in ["#000000", "#a0b1c2", "#ffffff"] {
-            assert_eq!(Colour::from_hex(text).map(Colour::hex).as_deref(), Some(text));
+            assert_eq!(
+                Colour::from_hex(text).map(Colour::hex).as_deref(),
+                Some(text)
+            );
         }
-        for wrong in ["", "#", "a0b1c2", "#a0b1c", "#a0b1c2d", "#+0b1c2", "#a0b1cé"] {
+        for wrong in [
+            "", "#", "a0b1c2", "#a0b1c", "#a0b1c2d", "#+0b1c2", "#a0b1cé",
+        ] {
             assert_eq!(Colour::from_hex(wrong), None, "{wrong}");
         }
     }

@@ -22,12 +22,8 @@ pub struct Answer {
 enum Content {
     Depth(Image),
     Rgb(Image),
-    Cloud {
-        binary: [Binary; 1],
-    },
-    Objects {
-        objects: Vec<WireObject>,
-    },
+    Cloud { binary: [Binary; 1] },
+    Objects { objects: Vec<WireObject> },
 }
 
 /// An image of the camera. Its pose is by the robot's belief.

@@ -10,7 +10,8 @@ use crate::bodies::Bodies;
 use crate::camera::{self, HOUSING_M};
 use crate::drive::Drive;
 use actcheck_data::{
-    Appearances, Camera, ChoiceName, Choices, Colour, Decor, ObjectModel, Part, SeenPart, Stream, Texture,
+    Appearances, Camera, ChoiceName, Choices, Colour, Decor, ObjectModel, Part, SeenPart, Stream,
+    Texture,
 };
 use actcheck_geometry::{Drawn, Finish, Light, RgbImage, Skin, draw, from_pose};
 use actcheck_robot::RobotModel;
@@ -149,7 +150,9 @@ impl Stage {
         });
         Self {
             floor: Skin::ground(FLOOR_SIDE_M, FLOOR),
-            objects: objects.map(|object| painted(&object, skins, decor)).collect(),
+            objects: objects
+                .map(|object| painted(&object, skins, decor))
+                .collect(),
             links: links.collect(),
             light: Light {
                 towards: Vector3::from(decor.to_light()),

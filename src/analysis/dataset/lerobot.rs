@@ -148,7 +148,8 @@ impl<'a> Export<'a> {
             return Ok(false);
         };
         let robot = (first.motion.joints.clone(), [image.height, image.width]);
-        if images.len() != taken.len() || *self.robot.get_or_insert_with(|| robot.clone()) != robot {
+        if images.len() != taken.len() || *self.robot.get_or_insert_with(|| robot.clone()) != robot
+        {
             return Ok(false);
         }
         if self.bytes > FILE_BYTES {
@@ -246,7 +247,10 @@ impl<'a> Export<'a> {
             .iter()
             .map(|frame| frame.is_last && frame.succeeded)
             .collect();
-        let reward: Vec<f32> = success.iter().map(|won| f32::from(u8::from(*won))).collect();
+        let reward: Vec<f32> = success
+            .iter()
+            .map(|won| f32::from(u8::from(*won)))
+            .collect();
         let columns = vec![
             Series::new(IMAGE.into(), pictures),
             Series::new(STATE.into(), lists(|frame| &frame.state)),
@@ -280,7 +284,10 @@ impl<'a> Export<'a> {
         let path = meta.join("episodes").join(place(0));
         self.write(&path, self.episodes.len(), self.episode_columns(), None)?;
         let below = Below::new(self.folder);
-        for (name, value) in [("info.json", self.info()), ("stats.json", self.statistics())] {
+        for (name, value) in [
+            ("info.json", self.info()),
+            ("stats.json", self.statistics()),
+        ] {
             let path = meta.join(name);
             new_text(&below, &path, &format!("{value:#}\n"))?
                 .finish()
@@ -407,9 +414,7 @@ fn signed(count: usize) -> i64 {
 
 /// Makes pandas take the tasks' texts as the index of their table, as LeRobot does.
 fn index_of_tasks() -> KeyValueMetadata {
-    let column = |name: Option<&str>, field: &str, kind: &str, numpy: &str| {
-        json!({"name": name, "field_name": field, "pandas_type": kind, "numpy_type": numpy, "metadata": null})
-    };
+    let column = |name: Option<&str>, field: &str, kind: &str, numpy: &str| json!({"name": name, "field_name": field, "pandas_type": kind, "numpy_type": numpy, "metadata": null});
     let described = json!({
         "index_columns": ["__index_level_0__"],
         "column_indexes": [],
@@ -471,8 +476,7 @@ mod tests {
         for values in [[1.0_f32, 4.0], [3.0, 4.0]] {
             all.add(&values);
         }
-        let expected =
-            json!({"min": [1.0, 4.0], "max": [3.0, 4.0], "mean": [2.0, 4.0], "std": [1.0, 0.0], "count": [2]});
+        let expected = json!({"min": [1.0, 4.0], "max": [3.0, 4.0], "mean": [2.0, 4.0], "std": [1.0, 0.0], "count": [2]});
         assert_eq!(all.described(), expected);
     }
 

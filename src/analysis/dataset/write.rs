@@ -9,8 +9,8 @@ use crate::dataset::fact_columns::{
     BODIES, CONTACTS, EXTREMES, INTERVALS, JOINT_EXTREMES, LINKS, PLACES, PLANES, SELF_CONTACTS,
     SHAPES, STATES,
 };
-use crate::dataset::sheets::Sheets;
 use crate::dataset::images::DrawImages;
+use crate::dataset::sheets::Sheets;
 use crate::dataset::{course, fact_source, images, source};
 use crate::tables::{new_text, outcomes_schema, pending_parquet, unwritten};
 use crate::{Hierarchy, Mirror, TableFilter};

@@ -99,7 +99,11 @@ fn span(edges: &[[Corner; 2]; 3], y: f64, width: usize) -> Option<[usize; 2]> {
             continue;
         }
         // Always from the same end, so that triangles that share an edge have no gap.
-        let [from, to] = if from[1] < to[1] { [from, to] } else { [to, from] };
+        let [from, to] = if from[1] < to[1] {
+            [from, to]
+        } else {
+            [to, from]
+        };
         let x = from[0] + (to[0] - from[0]) * ((y - from[1]) / (to[1] - from[1]));
         left = left.min(x);
         right = right.max(x);
@@ -124,7 +128,11 @@ mod tests {
             for (number, corners) in (0_u32..).zip(triangles) {
                 buffer.fill(*corners, number);
             }
-            buffer.facets.iter().filter(|number| **number != EMPTY).count()
+            buffer
+                .facets
+                .iter()
+                .filter(|number| **number != EMPTY)
+                .count()
         };
         let both = count(&[[a, b, c], [c, d, a]]);
         assert_eq!(both, count(&[[a, b, c]]) + count(&[[a, c, d]]));

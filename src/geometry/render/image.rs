@@ -261,13 +261,13 @@ impl Scene<'_> {
     /// The light that a sample gets from the surface that it sees.
     fn light_at(&self, buffer: &Buffer, sample: usize, shadows: &Shadows) -> [f64; 3] {
         let number = buffer.facets[sample] as usize;
-        let after = self
-            .placed
-            .partition_point(|placed| placed.first <= number);
+        let after = self.placed.partition_point(|placed| placed.first <= number);
         let placed = &self.placed[after - 1];
         let body = placed.body;
         let facet = &body.skin.facets[number - placed.first];
-        let seen = placed.pose.inverse_transform_point(&self.point(buffer, sample));
+        let seen = placed
+            .pose
+            .inverse_transform_point(&self.point(buffer, sample));
         let mut normal = normal_at(&body.skin.points, facet, &(seen / body.scale));
         if !facet.is_closed && normal.dot(&(seen - placed.eye)) > 0.0 {
             normal = -normal;
@@ -462,18 +462,33 @@ mod tests {
             colour: Colour([0, 0, 255]),
         });
         let [red, _, blue] = pixel(
-            &draw(LENS, &Isometry3::identity(), &[body.clone()], &light([-1.0, 0.0, 0.0])),
+            &draw(
+                LENS,
+                &Isometry3::identity(),
+                &[body.clone()],
+                &light([-1.0, 0.0, 0.0]),
+            ),
             32,
             24,
         );
         assert!(red < 5 && blue > 200, "{red} {blue}");
         body.near_m = 2.0;
-        let nothing = draw(LENS, &Isometry3::identity(), &[body], &light([-1.0, 0.0, 0.0]));
+        let nothing = draw(
+            LENS,
+            &Isometry3::identity(),
+            &[body],
+            &light([-1.0, 0.0, 0.0]),
+        );
         assert_eq!(pixel(&nothing, 32, 24), pixel(&nothing, 1, 1));
         // A floor that goes on behind the eye.
         let ground = Skin::ground(40.0, WHITE);
         let floor = drawn(&ground, [0.0, 0.0, -1.0], WHITE);
-        let image = draw(LENS, &Isometry3::identity(), &[floor], &light([0.0, 0.0, 1.0]));
+        let image = draw(
+            LENS,
+            &Isometry3::identity(),
+            &[floor],
+            &light([0.0, 0.0, 1.0]),
+        );
         assert_ne!(pixel(&image, 32, 47), pixel(&image, 32, 0));
     }
 }

@@ -45,7 +45,13 @@ impl Shadows {
         let cell_m = size / (CELLS as f64 - 2.0 * RIM);
         Self {
             turned,
-            low: low.map(|at| if at.is_finite() { at - RIM * cell_m } else { 0.0 }),
+            low: low.map(|at| {
+                if at.is_finite() {
+                    at - RIM * cell_m
+                } else {
+                    0.0
+                }
+            }),
             cell_m,
             map: Buffer::new(CELLS, CELLS),
         }
@@ -93,9 +99,7 @@ impl Shadows {
         // Between the centres of four cells, so that the border of a shadow is soft.
         let [left, top] = [x, y].map(|at| (at - 0.5).floor());
         let [right, down] = [x - 0.5 - left, y - 0.5 - top];
-        let line = |row: f64| {
-            reaches(left, row) * (1.0 - right) + reaches(left + 1.0, row) * right
-        };
+        let line = |row: f64| reaches(left, row) * (1.0 - right) + reaches(left + 1.0, row) * right;
         line(top) * (1.0 - down) + line(top + 1.0) * down
     }
 }

@@ -86,10 +86,7 @@ impl Skin {
 
 /// Returns the triangles that have an area, with the normals of their corners: the mean of those
 /// faces at the same place that are a round surface with it.
-fn shaded(
-    points: &[Point3<f64>],
-    triangles: &[[u32; 3]],
-) -> Vec<([u32; 3], [Vector3<f32>; 3])> {
+fn shaded(points: &[Point3<f64>], triangles: &[[u32; 3]]) -> Vec<([u32; 3], [Vector3<f32>; 3])> {
     let sized = triangles.iter().filter_map(|corners| {
         let [a, b, c] = corners.map(|idx| points[idx as usize]);
         let normal = (b - a).cross(&(c - a));

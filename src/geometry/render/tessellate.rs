@@ -174,18 +174,28 @@ mod tests {
             staves: 64,
         };
         let hull = Shape::Hull {
-            points: triangles(&Shape::Box { size: [0.3, 0.2, 0.1] })
-                .points
-                .iter()
-                .map(|point| point.coords.into())
-                .collect(),
+            points: triangles(&Shape::Box {
+                size: [0.3, 0.2, 0.1],
+            })
+            .points
+            .iter()
+            .map(|point| point.coords.into())
+            .collect(),
             volume: 0.006,
         };
         let shapes = [
-            Shape::Box { size: [0.3, 0.2, 0.1] },
-            Shape::Cylinder { radius: 0.2, height: 0.5 },
+            Shape::Box {
+                size: [0.3, 0.2, 0.1],
+            },
+            Shape::Cylinder {
+                radius: 0.2,
+                height: 0.5,
+            },
             Shape::Sphere { radius: 0.3 },
-            Shape::Capsule { radius: 0.1, height: 0.4 },
+            Shape::Capsule {
+                radius: 0.1,
+                height: 0.4,
+            },
             tube,
             hull,
         ];
