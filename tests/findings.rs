@@ -209,7 +209,7 @@ fn a_condition_and_an_effect_are_listed_apart() {
         matches!(how.as_slice(), [only] if only.starts_with("target perceived off ≥ 0.0")),
         "{how:?}"
     );
-    let text = findings_text(&summary_of(&table, report), Page::default());
+    let text = findings_text(&summary_of(&table, report), true, Page::default());
     let [condition, effect] = ["when (", "how ("].map(|title| text.find(title).unwrap());
     let place = |words: &str| {
         text.find(words)
@@ -253,7 +253,11 @@ fn without_a_significant_condition_the_strongest_are_shown_as_unsure() {
             .windows(2)
             .all(|pair| pair[0].condition.parameter() != pair[1].condition.parameter())
     );
-    let text = findings_text(&summary_of(&table, report(&table, found)), Page::default());
+    let text = findings_text(
+        &summary_of(&table, report(&table, found)),
+        true,
+        Page::default(),
+    );
     assert!(
         text.contains("none is confirmed beyond chance; the strongest (perhaps by chance):"),
         "{text}"
@@ -343,7 +347,7 @@ fn collisions_are_counted_by_type_and_place() {
         "furniture is not movable"
     );
     let summary = summary(&table, 0);
-    let text = findings_text(&summary, Page::default());
+    let text = findings_text(&summary, true, Page::default());
     assert!(
         text.contains("Pick: in 50 % [35–65] of 40 runs") && text.contains("Table (furniture)"),
         "{text}"

@@ -15,7 +15,8 @@
 //! + sed = 7
 //! ```
 //!
-//! A case whose first line contains `(history)` has a history of a campaign `k7f3` in `.actcheck`.
+//! A case whose first line contains `(history)` has a history of a campaign `k7f3` in `.actcheck`; in
+//! one with `(Python package)`, `python3` has the package of `clients/python`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -24,10 +25,10 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::support::expected::assert_expected;
-use crate::support::{actcheck, copy, copy_made_history, edit, root, stderr, stdout};
+use crate::support::{actcheck, copy, copy_made_history, edit, foreign, root, stderr, stdout};
 
 /// Number of cases at least.
-const LEAST: usize = 66;
+const LEAST: usize = 160;
 /// A run's id in commands and outputs.
 const RUN: &str = "k7f3-1";
 
@@ -117,7 +118,11 @@ fn printed(case: &Path, history: &Path, run: &str) -> String {
     let arguments = set_up(&text, folder.path())
         .into_iter()
         .map(|word| word.replace(&shown, &of_run));
-    let output = Command::new(env!("CARGO_BIN_EXE_actcheck"))
+    let mut command = Command::new(env!("CARGO_BIN_EXE_actcheck"));
+    if text.contains("(Python package)") {
+        command.env("PATH", foreign::client_path());
+    }
+    let output = command
         .args(arguments)
         .current_dir(folder.path())
         .env_remove("CLICOLOR_FORCE")

@@ -104,6 +104,64 @@ fn courses(folder: &Path, json: &Value) -> Vec<(String, String)> {
         .collect()
 }
 
+/// Output, commands and questions of every run are kept, bounded, and at simulated times: the same
+/// with any number of workers.
+#[test]
+fn the_side_of_a_program_is_kept_with_any_number_of_workers() {
+    let folder = project("talks.py", "[[\"Pick\"]]", 4, "");
+    let sides = |jobs: &str| -> Vec<Value> {
+        let (_, json, complaints) = run(folder.path(), &["--jobs", jobs]);
+        assert_eq!(json["counts"]["broken"].as_u64(), Some(0), "{complaints}");
+        let shown = runs(&json)
+            .iter()
+            .map(|run| shown(folder.path(), of(run, "run")));
+        shown.map(|mut run| run["skill"].take()).collect()
+    };
+    let alone = sides("1");
+    assert_eq!(alone, sides("2"));
+    for side in &alone {
+        let entries = side["entries"].as_array().unwrap();
+        let printed: Vec<&str> = entries
+            .iter()
+            .filter_map(|entry| entry["printed"].as_str())
+            .collect();
+        assert!(
+            !printed.iter().any(|line| line.contains("process")),
+            "{side}"
+        );
+        assert!(printed[0].starts_with("sees glass_1"), "{side}");
+        assert_eq!(printed[1], "half way");
+        let left_out = side["lines_left_out"].as_u64().unwrap();
+        assert!(printed.len() <= 200 && (left_out == 0 || printed.len() == 200));
+        assert_eq!(entries[0]["asked"], "objects");
+        let stretches: Vec<(u64, f64)> = entries
+            .iter()
+            .filter_map(|entry| {
+                let secs = entry["until"].as_f64()? - entry["secs"].as_f64()?;
+                Some((entry["commands"].as_u64()?, (secs * 10.0).round() / 10.0))
+            })
+            .collect();
+        assert_eq!(stretches, [(30, 0.5), (1, 0.5)]);
+    }
+    let text = stdout(&actcheck(
+        folder.path(),
+        &["show", "@last", "--history", ".actcheck"],
+    ));
+    for words in [
+        "the program's side",
+        "│ half way",
+        "30 commands, at last arm_flex_joint -0.29",
+    ] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    let (_, _, streamed) = run(folder.path(), &["--jobs", "2", "-v", "--runs", "2"]);
+    assert_eq!(streamed.matches("half way").count(), 2, "{streamed}");
+    assert!(
+        streamed.contains("starts"),
+        "the start is streamed, too: {streamed}"
+    );
+}
+
 #[test]
 fn a_program_gives_the_same_results_with_any_number_of_workers() {
     let folder = project(
@@ -255,7 +313,7 @@ fn ground_truth_is_sent_only_on_request_and_reports_mention_it() {
 }
 
 /// The fault of the first run, its status, and its message.
-const FAULTS: [(&str, &str, &str); 36] = [
+const FAULTS: [(&str, &str, &str); 38] = [
     (
         "exit_at_start",
         "broken",
@@ -363,6 +421,16 @@ const FAULTS: [(&str, &str, &str); 36] = [
         "zero_quaternion",
         "broken",
         "whose quaternion [0.0, 0.0, 0.0, 0.0] is not a rotation",
+    ),
+    (
+        "degrees",
+        "broken",
+        "has the target -45 rad for `arm_flex_joint`, whose limits are",
+    ),
+    (
+        "millimetres",
+        "broken",
+        "has the target 80 m for the gripper's opening, whose limits are 0.0000 and",
     ),
     ("chatter", "broken", "bytes in one run"),
     (

@@ -50,13 +50,6 @@ fn the_client_passes_its_type_checks() {
     assert!(output.status.success(), "{}", stdout(&output));
 }
 
-/// A search path with the examples' Python first.
-fn path() -> std::ffi::OsString {
-    let bin = foreign::client_python().parent().unwrap().to_owned();
-    let others = std::env::var_os("PATH").unwrap_or_default();
-    std::env::join_paths(std::iter::once(bin).chain(std::env::split_paths(&others))).unwrap()
-}
-
 /// Runs a configuration whose launcher is an example. Returns the printed output and the state
 /// digests, by run.
 fn campaign(folder: &Path, example: &str, arguments: &[&str]) -> (Value, String) {
@@ -84,7 +77,7 @@ fn campaign(folder: &Path, example: &str, arguments: &[&str]) -> (Value, String)
         ])
         .args(arguments)
         .current_dir(folder)
-        .env("PATH", path())
+        .env("PATH", foreign::client_path())
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .output()
         .unwrap();
@@ -191,7 +184,7 @@ fn a_python_look_finds_the_plane() {
             "json",
         ])
         .current_dir(folder.path())
-        .env("PATH", path())
+        .env("PATH", foreign::client_path())
         .env("PYTHONDONTWRITEBYTECODE", "1")
         .output()
         .unwrap();
@@ -230,7 +223,7 @@ fn an_exception_in_a_skill_breaks_the_run_and_soon_ends_the_campaign() {
             "h",
         ])
         .current_dir(folder.path())
-        .env("PATH", path())
+        .env("PATH", foreign::client_path())
         .output()
         .unwrap();
     let (json, said): (Value, String) = (

@@ -77,6 +77,11 @@ impl Operator<'_> {
         }
     }
 
+    /// Simulated time since the scene was built. Unit: seconds.
+    pub fn time_secs(&self) -> f64 {
+        self.world.time_secs()
+    }
+
     /// Advances the simulation by this number of control ticks.
     ///
     /// # Errors

@@ -7,7 +7,7 @@ use crate::skills::skill;
 use crate::{ActionCall, ExternalFault, ExternalSkill, Saboteur};
 use actcheck_data::{
     ActionEnd, ActionReport, ActionTrace, Budget, Choices, ContactEpisode, Extremes, Form, Frames,
-    RobotCourse, SceneMap, Snapshot, Trace,
+    RobotCourse, SceneMap, SkillLog, Snapshot, Trace,
 };
 use actcheck_world::{OtherEngine, Playback, World, keep_playback, move_by};
 
@@ -145,6 +145,7 @@ pub fn perform_with(
         forms,
         robot_courses,
         lacks: Vec::new(),
+        skill: SkillLog::default(),
     }
 }
 

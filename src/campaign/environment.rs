@@ -19,7 +19,7 @@ use actcheck_data::{Choice, ChoiceName, RobotView};
 use actcheck_history::{CampaignRecord, FindingRecord, History, SkillRecord};
 use actcheck_ontology as ontology;
 use actcheck_ontology::Ontology;
-use actcheck_protocol::Programs;
+use actcheck_protocol::{LineSink, Programs};
 use actcheck_rules::{Budget, RuleBook};
 use actcheck_scenario::Space;
 use actcheck_search::Strategy;
@@ -335,6 +335,13 @@ impl Env {
                 digest: skill.digest.clone(),
                 privileged: skill.privileged,
             }),
+        }
+    }
+
+    /// Hands each line that the program prints to `sink`, when it is printed.
+    pub fn stream_output(&mut self, sink: LineSink) {
+        if let Some(programs) = &mut self.programs {
+            programs.set_line_sink(sink);
         }
     }
 

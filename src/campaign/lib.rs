@@ -51,6 +51,7 @@ mod starts;
 mod tally;
 mod workers;
 
+pub use actcheck_protocol::LineSink;
 pub use actcheck_world::{EngineContact, EngineState, MovedObject, Setpoint};
 pub use actcheck_world::{FingerJoint, Proposal, UnknownHand};
 pub use appearance::appearances;

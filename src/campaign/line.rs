@@ -171,9 +171,12 @@ pub(super) fn simulate(
         playback: interference.playback,
         other_engine: interference.other_engine,
     };
-    let (trace, quality) = perform(env, test, &scene, &mut choices, disturb, interference)?;
+    let (mut trace, quality) = perform(env, test, &scene, &mut choices, disturb, interference)?;
     if program.as_ref().is_some_and(Performance::was_stopped) {
         return Err(Failure::Interrupted);
+    }
+    if let Some(program) = &mut program {
+        trace.skill = program.take_log();
     }
     let program_output = program
         .as_ref()

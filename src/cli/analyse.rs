@@ -60,6 +60,9 @@ pub struct AnalyseArgs {
     /// The runs to analyse, and their history.
     #[command(flatten)]
     pub chosen: ChosenRuns,
+    /// Print intervals, p-values and other figures of the patterns, and the extent of the search
+    #[arg(long, short)]
+    pub verbose: bool,
     /// How it is printed (csv: the patterns, or with --by the cells of the map; json: everything)
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: Format,
@@ -119,7 +122,7 @@ pub fn analyse(args: &AnalyseArgs) -> Result<(), Diagnostics> {
         return Ok(());
     }
     output::print(&match args.format {
-        Format::Text => findings_text(&summary, output::page()),
+        Format::Text => findings_text(&summary, args.verbose, output::page()),
         Format::Csv if !args.by.is_empty() => {
             maps_table(&summary).render(args.format.into(), output::page())
         }

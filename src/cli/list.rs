@@ -87,7 +87,11 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
         campaign: args.campaign.clone(),
         ..RunFilter::default()
     };
-    let (mut runs, words) = chosen_runs(args, &history, &filter)?;
+    let ChosenRuns {
+        mut runs,
+        words,
+        failed,
+    } = chosen_runs(args, &history, &filter)?;
     if !args.conditions.is_empty() {
         let campaign = args.campaign.as_ref();
         let found = matching_runs(
@@ -122,8 +126,13 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
         "trace_hash",
         "index",
         "weight",
+        "status",
         "test",
+        "score",
     ]);
+    if args.failed {
+        table.columns.extend(["failed", "why"].map(str::to_owned));
+    }
     table.columns.extend(
         args.property
             .iter()
@@ -146,9 +155,14 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
             .flatten()
             .map(|words| words.as_str().into());
         let contested = any_contested.then(|| contested_in(&row.run));
+        let why = args.failed.then(|| {
+            let names = failed.get(&row.run).map_or("", String::as_str);
+            [names.into(), reason(&history, &row.run).into()]
+        });
         shown
             .iter()
             .map(|(.., cell)| cell(row))
+            .chain(why.into_iter().flatten())
             .chain(words)
             .chain(contested)
             .collect()
@@ -199,16 +213,43 @@ fn outcome(word: &str) -> Result<Outcome, OptionFault> {
         .ok_or_else(|| did_you_mean(word, Outcome::ALL.map(Outcome::word)).into())
 }
 
-/// The outcomes of the named properties by run: one text for each property.
-type OutcomeWords = BTreeMap<String, Vec<String>>;
+/// Longest reason of a failure in a list; of a longer one, only the first part is printed. Unit:
+/// characters.
+const LONGEST_REASON: usize = 90;
 
-/// The runs that the options choose, and the outcomes of the named properties in each: one text for
-/// each property, with the outcomes of all actions that have it.
+/// The first reason why a run failed. Empty if its details can't be read, which other commands
+/// report.
+fn reason(history: &History, run: &str) -> String {
+    let detail = history.newest_run(run).ok();
+    let judgements = detail.iter().flat_map(|run| &run.actions);
+    let failed = judgements
+        .flat_map(|action| &action.judgements)
+        .find(|judgement| judgement.outcome == Outcome::Failed);
+    let reason = failed.map_or("", |judgement| judgement.witness.as_str());
+    let too_long = reason.chars().count() > LONGEST_REASON;
+    match reason.split_once("; ").filter(|_| too_long) {
+        Some((first, _)) => format!("{first}; …"),
+        None => reason.to_owned(),
+    }
+}
+
+/// The runs that the options choose.
+#[derive(Default)]
+struct ChosenRuns {
+    runs: Vec<RunRow>,
+    /// The outcomes of the named properties by run: one text for each property, with the outcomes of
+    /// all actions that have it.
+    words: BTreeMap<String, Vec<String>>,
+    /// The names of the failed properties by run, if only failed runs are wanted.
+    failed: BTreeMap<String, String>,
+}
+
+/// The runs that the options choose.
 fn chosen_runs(
     args: &ListArgs,
     history: &History,
     filter: &RunFilter,
-) -> Result<(Vec<RunRow>, OutcomeWords), Diagnostics> {
+) -> Result<ChosenRuns, Diagnostics> {
     let wanted = args.wanted();
     let by_outcome = wanted.is_some() || !args.property.is_empty();
     let judgements = if by_outcome {
@@ -216,7 +257,7 @@ fn chosen_runs(
     } else {
         Judgements::None
     };
-    let (mut runs, mut words) = (Vec::new(), BTreeMap::new());
+    let mut chosen = ChosenRuns::default();
     let mut judged: BTreeSet<Arc<str>> = BTreeSet::new();
     history.each_judged(
         filter,
@@ -252,16 +293,25 @@ fn chosen_runs(
                     .join(", ")
             };
             if !args.property.is_empty() {
-                words.insert(
+                chosen.words.insert(
                     run.row.run.clone(),
                     args.property.iter().map(outcomes).collect(),
                 );
             }
-            runs.push(run.row);
+            if args.failed {
+                let of_run = run.outcomes.iter();
+                let mut names: Vec<&str> = of_run
+                    .filter(|own| own.outcome == Outcome::Failed)
+                    .map(|own| names::local(&own.property))
+                    .collect();
+                names.dedup();
+                chosen.failed.insert(run.row.run.clone(), names.join(", "));
+            }
+            chosen.runs.push(run.row);
         },
     )?;
     if by_outcome {
         chosen::all_judged(&args.property, judged.iter().map(|property| &**property))?;
     }
-    Ok((runs, words))
+    Ok(chosen)
 }

@@ -19,16 +19,16 @@ use actcheck_analysis as analysis;
 use actcheck_analysis::{Interval, Mirror, Sampling};
 use actcheck_base::{Diagnostic, Diagnostics, Outcome};
 use actcheck_campaign::{
-    CampaignOptions, CampaignResult, Ending, Env, ExhaustedBudget, RunContext, StoredRuns,
-    WeightedRate, resume_until,
+    CampaignOptions, CampaignResult, Ending, Env, ExhaustedBudget, LineSink, RunContext,
+    StoredRuns, WeightedRate, resume_until,
 };
 use actcheck_history as history;
 use actcheck_history::{History, RunFilter, RunRecord, RunRow, newest_of_alike};
 use actcheck_report::{
     CampaignSummary, EndedBy, GuidedSearch, HealthSummary, RelationsSummary, RunSummary,
-    WeightedLine, campaign_json, campaign_result_text, campaign_table, campaign_text, compare_text,
-    health_json, health_lines, relations_json, relations_text, shrunk_json, shrunk_text,
-    with_shrunk,
+    WeightedLine, campaign_json, campaign_result_text, campaign_runs_text, campaign_table,
+    campaign_text, compare_text, health_json, health_lines, relations_json, relations_text,
+    shrunk_json, shrunk_text, with_shrunk,
 };
 use actcheck_rules::Budget;
 use actcheck_verdict::{Counts, mean};
@@ -66,7 +66,7 @@ pub fn run(args: &RunArgs) -> Result<u8, Diagnostics> {
 /// first run. Returns the exit code.
 pub(super) fn campaign(
     args: &RunArgs,
-    session: Session,
+    mut session: Session,
     stop: &AtomicBool,
     on_bar: impl FnOnce(ProgressBar),
 ) -> Result<u8, Diagnostics> {
@@ -79,6 +79,12 @@ pub(super) fn campaign(
         _ => Progress::new(planned, session.env.campaign.limits.time_secs),
     };
     on_bar(progress.bar());
+    if verbosity == Verbosity::Verbose {
+        let bar = progress.bar();
+        session.env.stream_output(LineSink::new(move |run, line| {
+            bar.suspend(|| output::print_error_text(&format!("{run} │ {line}\n")));
+        }));
+    }
     let mut gate = Gate::open(args, &session.env, &session.history, &session.id)?;
     session.begin((clock.now)())?;
     let options = CampaignOptions {
@@ -90,12 +96,14 @@ pub(super) fn campaign(
     };
     let mut runs: Vec<RunSummary> = session.kept.iter().map(RunSummary::from_history).collect();
     runs.iter().for_each(|run| progress.run(run));
-    let mut failures = LiveFailures::new(&session.env, &session.id, verbosity);
+    let mut failures = LiveFailures::new(&session.env);
     let mut mirrored = runs.len();
     let mut gate_faults = Diagnostics::new();
     let (end, mut faults) = make_runs(&session, &options, stop, |record| {
         let summary = RunSummary::of(record);
-        if let Some(text) = failures.text(&summary) {
+        if verbosity == Verbosity::Verbose
+            && let Some(text) = failures.text(&summary)
+        {
             progress.tell(&text);
         }
         progress.run(&summary);
@@ -268,9 +276,13 @@ fn mirror(history: &History) {
 fn interrupt() -> (Arc<AtomicBool>, Arc<OnceLock<ProgressBar>>) {
     let shown = Arc::new(OnceLock::<ProgressBar>::new());
     let bar = Arc::clone(&shown);
-    let stop = stop::on_interrupt(move || match bar.get() {
-        Some(bar) => bar.println("stopping after the runs in flight; Ctrl-C again stops at once"),
+    let stop = stop::on_interrupt(move || {
+        match bar.get() {
+        Some(bar) => bar.println(
+            "stopping after the runs in flight; `actcheck run --resume` makes the others later; Ctrl-C again stops at once",
+        ),
         None => stop::end_now(),
+    }
     });
     (stop, shown)
 }
@@ -291,11 +303,10 @@ impl Results<'_> {
         output::print(&match self.format {
             Format::Text => {
                 let page = output::page();
-                let quiet = self.verbosity == Verbosity::Quiet;
-                let text = if quiet {
-                    campaign_result_text
-                } else {
-                    campaign_text
+                let text = match self.verbosity {
+                    Verbosity::Quiet => campaign_result_text,
+                    Verbosity::Usual => campaign_text,
+                    Verbosity::Verbose => campaign_runs_text,
                 }(self.summary, page);
                 text + &self
                     .health

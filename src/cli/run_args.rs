@@ -87,8 +87,8 @@ pub struct RunArgs {
     /// Print only the result: scores and failures, without progress, tables and notes
     #[arg(long, short, conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Print every failure when it happens, each with all its failed properties; otherwise the
-    /// first ten, each with one
+    /// Print every failure when it happens, with all its failed properties, and each line that a
+    /// program of your own prints; then a table of the runs
     #[arg(long, short)]
     pub verbose: bool,
 }
@@ -98,9 +98,9 @@ pub struct RunArgs {
 pub enum Verbosity {
     /// Only the result.
     Quiet,
-    /// Also progress, the first failures when they happen, and tables.
+    /// Also progress and tables.
     Usual,
-    /// Also all other failures.
+    /// Also every failure and every line of a program when it happens, and a table of the runs.
     Verbose,
 }
 

@@ -13,8 +13,9 @@ use crate::{history_dir, output, restore};
 use actcheck_analysis::perceived_sentences;
 use actcheck_base::{Diagnostics, names};
 use actcheck_campaign::made_by_other_physics;
+use actcheck_data::Trace;
 use actcheck_history::{CampaignRecord, FindingRecord, History, RunDetail};
-use actcheck_report::{Table, run_json, run_text};
+use actcheck_report::{Table, run_json, run_text, skill_json, skill_text};
 
 /// `actcheck show`
 #[derive(Debug, Args)]
@@ -47,19 +48,27 @@ pub fn show(args: &ShowArgs) -> Result<(), Diagnostics> {
     restore::allow(&history, args.trust.trust);
     let run = history.newest_run(&args.run)?;
     // The store has the outcomes, also those of a run whose trace is damaged.
-    let (perceived, damage) = match perceived(&history, &run) {
-        Ok(perceived) => (perceived, None),
-        Err(faults) => (BTreeMap::new(), Some(faults)),
+    let (trace, damage) = match trace_of(&history, &run, args.trust.trust) {
+        Ok(trace) => (trace, None),
+        Err(faults) => (None, Some(faults)),
     };
+    let perceived = trace
+        .as_ref()
+        .map(|trace| perceived_sentences(&run, trace))
+        .unwrap_or_default();
     output::print(&match args.format {
         Format::Text => {
             let page = output::page();
             let again = judged_again(&history.run(&run.row.run)?, &run);
             let campaign = history.campaign(&run.row.campaign)?;
             let notes = again + &made_by(&campaign) + &findings(&campaign);
-            run_text(&run, &perceived, page) + &page.set(&notes)
+            run_text(&run, &perceived, page) + &trace.as_ref().map_or_else(String::new, |trace| skill_text(trace, page)) + &page.set(&notes)
         }
-        Format::Json => format!("{:#}\n", run_json(&run, &perceived)),
+        Format::Json => {
+            let mut json = run_json(&run, &perceived);
+            json["skill"] = trace.as_ref().map(skill_json).into();
+            format!("{json:#}\n")
+        }
         Format::Csv => outcomes(&run).render(Format::Csv.into(), output::page()),
     });
     if let Some(faults) = damage {
@@ -95,6 +104,27 @@ fn findings(campaign: &CampaignRecord) -> String {
         )
     };
     campaign.findings.iter().map(line).collect()
+}
+
+/// The trace of a run: with its motion if a program took part, whose joints are then shown, and if
+/// it is kept or may be simulated again. `None` if the trace is missing.
+///
+/// # Errors
+/// `H007` it is damaged.
+fn trace_of(
+    history: &History,
+    run: &RunDetail,
+    is_trusted: bool,
+) -> Result<Option<Trace>, Diagnostics> {
+    let id = &run.row.run;
+    let states = history_dir::unless_damaged(history.traces().states(id))?;
+    match states {
+        Some(trace) if !trace.skill.is_empty() && (is_trusted || history.is_whole(id)?) => {
+            let whole = history.traces().whole_if_allowed(id)?;
+            Ok(Some(whole.unwrap_or(trace)))
+        }
+        states => Ok(states),
+    }
 }
 
 /// Sentences about the perceived targets of a run's actions that failed, by their positions. Empty

@@ -25,6 +25,7 @@ mod scene;
 mod scene_map;
 mod settings;
 mod shape;
+mod skill_log;
 mod snapshot;
 mod stated_robot;
 mod stream;
@@ -55,6 +56,10 @@ pub use scene::{Attached, KnownKind, RobotStart, Role, Scene, SceneObject};
 pub use scene_map::{NamedSurface, SceneMap};
 pub use settings::{Budget, CONTROL_HZ, Camera, Odometry, Physics, Range, Sensing};
 pub use shape::{Part, Shape, bounds};
+pub use skill_log::{
+    AnsweredObject, AnsweredQuestion, CommandStretch, CommandTarget, SkillDeed, SkillEntry,
+    SkillLog, TargetKind,
+};
 pub use snapshot::{BodyState, CupState, JointState, LinkState, RobotState, Snapshot};
 pub use stated_robot::{FINGER_FRICTION, GRIP_FORCE_N, StatedFingers, StatedHand, StatedRobot};
 pub use stream::Stream;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Part, Pose, RobotCourse, SceneMap, Snapshot};
+use crate::{Part, Pose, RobotCourse, SceneMap, SkillLog, Snapshot};
 
 /// A whole run as recorded by the simulation.
 ///
@@ -34,6 +34,8 @@ pub struct Trace {
     /// (`gripper`); of a quantity over time, `samples/z` if no thing has it, `samples/each/z` if some
     /// thing that can move lacks it, or `samples` if none was recorded.
     pub lacks: Vec<String>,
+    /// The user's program in the run; empty if the reference skills performed all actions.
+    pub skill: SkillLog,
 }
 
 impl Trace {

@@ -8,7 +8,8 @@ use std::sync::Arc;
 use crate::frames;
 use actcheck_base::Steps;
 use actcheck_data::{
-    ActionTrace, Choice, Form, Frames, RobotCourse, Samples, SceneMap, Series, Snapshot, Trace,
+    ActionTrace, Choice, Form, Frames, RobotCourse, Samples, SceneMap, Series, SkillLog, Snapshot,
+    Trace,
 };
 
 /// The reason why a part of a run can't be encoded or decoded.
@@ -33,7 +34,7 @@ pub(super) enum CodecFault {
 const MOST_SAMPLES: usize = 1 << 26;
 
 /// First part: choices, states, actions, time between frames, names of tracks, hash, map, forms of
-/// bodies, the courses of the robot, and the missing facts.
+/// bodies, the courses of the robot, the missing facts, and the user's program.
 type Head = (
     Vec<Choice>,
     Vec<Snapshot>,
@@ -45,6 +46,7 @@ type Head = (
     Vec<Form>,
     Vec<RobotCourse>,
     Vec<String>,
+    SkillLog,
 );
 
 /// Encodes the choices and the data from which facts are extracted.
@@ -64,6 +66,7 @@ pub(super) fn encode_head(choices: &[Choice], trace: &Trace) -> Result<Vec<u8>, 
         &trace.forms,
         &trace.robot_courses,
         &trace.lacks,
+        &trace.skill,
     );
     postcard::to_stdvec(&head).map_err(CodecFault::Encoding)
 }
@@ -220,8 +223,19 @@ pub(super) fn head_choices(head: &[u8]) -> Result<Vec<Choice>, CodecFault> {
 /// It is damaged.
 pub(super) fn decode_head(head: &[u8]) -> Result<(Vec<Choice>, Trace), CodecFault> {
     let head: Head = postcard::from_bytes(head).map_err(CodecFault::States)?;
-    let (choices, snapshots, actions, period_secs, names, hash, map, forms, robot_courses, lacks) =
-        head;
+    let (
+        choices,
+        snapshots,
+        actions,
+        period_secs,
+        names,
+        hash,
+        map,
+        forms,
+        robot_courses,
+        lacks,
+        skill,
+    ) = head;
     let frames = Frames {
         period_secs,
         names,
@@ -236,6 +250,7 @@ pub(super) fn decode_head(head: &[u8]) -> Result<(Vec<Choice>, Trace), CodecFaul
         forms,
         robot_courses,
         lacks,
+        skill,
     };
     Ok((choices, trace))
 }

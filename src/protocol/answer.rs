@@ -6,7 +6,8 @@ use serde::Serialize;
 
 use crate::message::{Ask, Binary, What, WireObject, WirePose};
 use actcheck_actions::Operator;
-use actcheck_data::Pose;
+use actcheck_base::printable;
+use actcheck_data::{AnsweredObject, AnsweredQuestion, Pose};
 use actcheck_world::DepthImage;
 
 /// An answer.
@@ -35,6 +36,40 @@ struct Image {
     horizontal_fov_rad: f64,
     focal_px: f64,
     binary: [Binary; 1],
+}
+
+/// Number of objects of an answer that are recorded.
+const MOST_OBJECTS: usize = 8;
+/// Longest id of a requested object that is recorded. Unit: characters.
+const LONGEST_ID: usize = 100;
+
+impl Answer {
+    /// The record of the request and of this answer, whose binary data have `bytes`.
+    pub fn record(&self, ask: &Ask, bytes: usize) -> AnsweredQuestion {
+        let (count, objects) = match &self.content {
+            Content::Depth { width, height, .. } => (width * height, &[][..]),
+            Content::Cloud {
+                binary: [Binary { shape, .. }],
+            } => (shape.first().copied().unwrap_or(0), &[][..]),
+            Content::Objects { objects } => (objects.len(), objects.as_slice()),
+        };
+        let id = |text: &str| printable(text).chars().take(LONGEST_ID).collect();
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "seven digits are enough to read a position"
+        )]
+        let object = |object: &WireObject| AnsweredObject {
+            id: object.id.clone(),
+            position_m: object.pose.position_m.map(|along| along as f32),
+        };
+        AnsweredQuestion {
+            what: ask.what.word().to_owned(),
+            of: ask.of.as_deref().map(id),
+            count: count as u64,
+            bytes: bytes as u64,
+            objects: objects.iter().take(MOST_OBJECTS).map(object).collect(),
+        }
+    }
 }
 
 /// The answer to a request, and the payload of the binary frame that follows it, if any.

@@ -98,7 +98,7 @@ impl WireCommand {
             seen: Vec::new(),
         };
         let mut controls = Controls {
-            positions: taken.list(&self.positions)?,
+            positions: taken.positions(&self.positions)?,
             velocities: taken.list(&self.velocities)?,
             efforts: taken.list(&self.efforts)?,
             base_velocity: self.base_velocity,
@@ -107,6 +107,13 @@ impl WireCommand {
         };
         if controls.base_velocity.is_some() {
             taken.base()?;
+        }
+        if let Some(opening_m) = controls.opening_m {
+            check_unit(
+                "the gripper's opening",
+                opening_m,
+                ([0.0, joints.max_opening_m], "m"),
+            )?;
         }
         for (number, (name, angle)) in self
             .head
@@ -120,6 +127,7 @@ impl WireCommand {
                 .get(number)
                 .ok_or_else(|| wrong(format!("the robot's head has no {name}")))?;
             taken.once(*joint, name)?;
+            taken.check_limits(*joint, angle)?;
             controls.positions.push((*joint, angle));
         }
         Ok((self.ticks, controls))
@@ -145,6 +153,22 @@ impl CommandedJoints<'_> {
             .iter()
             .map(|(name, value)| Ok((self.joint(name)?, *value)))
             .collect()
+    }
+
+    /// Target positions, which may be beyond limits, but not by another unit.
+    fn positions(&mut self, targets: &Targets) -> Result<Vec<(usize, f64)>, ExternalFault> {
+        let list = self.list(targets)?;
+        for (joint, position) in &list {
+            self.check_limits(*joint, *position)?;
+        }
+        Ok(list)
+    }
+
+    fn check_limits(&self, joint: usize, position: f64) -> Result<(), ExternalFault> {
+        match (self.joints.names.get(joint), self.joints.limits.get(joint)) {
+            (Some(name), Some(limits)) => check_unit(&format!("`{name}`"), position, *limits),
+            _ => Ok(()),
+        }
     }
 
     fn joint(&mut self, name: &str) -> Result<usize, ExternalFault> {
@@ -192,6 +216,23 @@ impl CommandedJoints<'_> {
             None => Ok(()),
         }
     }
+}
+
+/// Refuses a target that is farther beyond its limits than they are apart: it is in another unit,
+/// such as degrees or millimetres. Nearer ones stop at the limits.
+fn check_unit(
+    name: &str,
+    target: f64,
+    ([lower, upper], unit): ([f64; 2], &str),
+) -> Result<(), ExternalFault> {
+    let range = upper - lower;
+    if !range.is_finite() || (lower - range..=upper + range).contains(&target) {
+        return Ok(());
+    }
+    Err(wrong(format!(
+        "its command has the target {target} {unit} for {name}, whose limits are {lower:.4} and {upper:.4} {unit}: is it in \
+         another unit?"
+    )))
 }
 
 fn wrong(reason: String) -> ExternalFault {

@@ -92,6 +92,12 @@ impl Role {
 pub struct Joints {
     /// Index and role.
     pub by_name: BTreeMap<String, (usize, Role)>,
+    /// Names by index.
+    pub names: Vec<String>,
+    /// Limits of positions by index, with their unit; infinite if there are none.
+    pub limits: Vec<([f64; 2], &'static str)>,
+    /// Widest gap between the fingers. Unit: metres.
+    pub max_opening_m: f64,
     /// Indices of the pan and tilt joints that exist.
     pub head: Vec<usize>,
     /// Whether the base is mobile.
@@ -102,22 +108,32 @@ impl Joints {
     /// The joints of the robot in a world.
     pub fn of(world: &World) -> Self {
         let roles = roles(world);
-        let names = world
-            .kinematics()
-            .joints()
-            .iter()
-            .map(|joint| joint.name.clone());
+        let joints = world.kinematics().joints();
+        let names: Vec<String> = joints.iter().map(|joint| joint.name.clone()).collect();
         let by_name = names
+            .iter()
+            .cloned()
             .zip(roles)
             .enumerate()
             .map(|(idx, (name, role))| (name, (idx, role)))
             .collect();
         Self {
             by_name,
+            names,
+            limits: joints.iter().map(limits).collect(),
+            max_opening_m: world.profile().hand.max_opening_m,
             head: world.layout().head.clone(),
             drives: world.layout().base.is_some(),
         }
     }
+}
+
+fn limits(joint: &Joint) -> ([f64; 2], &'static str) {
+    let unit = match joint.kind {
+        JointKind::Prismatic => "m",
+        JointKind::Revolute => "rad",
+    };
+    ([joint.lower, joint.upper], unit)
 }
 
 /// The introduction of the robot in a world to the program of one worker.

@@ -11,6 +11,7 @@ mod frame;
 #[cfg(test)]
 mod fuzz;
 mod hello;
+mod log;
 mod message;
 #[cfg(test)]
 #[path = "../../tests/support/mutations.rs"]
@@ -23,6 +24,7 @@ mod process;
 mod remember;
 mod session;
 
+pub use log::LineSink;
 pub use message::PROTOCOL;
 pub use performance::{Performance, RunName};
 pub use pool::Programs;

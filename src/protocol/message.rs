@@ -173,6 +173,17 @@ pub enum What {
     Objects,
 }
 
+impl What {
+    /// The word for it in messages.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Depth => "depth",
+            Self::Cloud => "cloud",
+            Self::Objects => "objects",
+        }
+    }
+}
+
 /// The end of an action.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -13,7 +13,7 @@ use crate::remember::{Grasped, remember};
 use crate::session::Session;
 use actcheck_actions::{ActionCall, ExternalFault, ExternalSkill, Interrupt, Operator};
 use actcheck_base::printable;
-use actcheck_data::ActionReport;
+use actcheck_data::{ActionReport, SkillLog};
 use actcheck_world::World;
 
 /// Longest final message of an action that is kept. Unit: characters.
@@ -45,6 +45,8 @@ pub struct Performance<'a> {
     stopped: bool,
     /// Its last output lines, if it caused a fault.
     output: Option<Vec<String>>,
+    /// Its log, if it was ended in this run.
+    log: SkillLog,
 }
 
 impl<'a> Performance<'a> {
@@ -63,6 +65,7 @@ impl<'a> Performance<'a> {
             stop,
             stopped: false,
             output: None,
+            log: SkillLog::default(),
         }
     }
 
@@ -76,6 +79,14 @@ impl<'a> Performance<'a> {
         self.output.as_deref()
     }
 
+    /// The log of the run. It is then empty.
+    pub fn take_log(&mut self) -> SkillLog {
+        match &mut self.lent.worker.session {
+            Some(session) => session.take_log(),
+            None => std::mem::take(&mut self.log),
+        }
+    }
+
     /// The program. It is started if it is not running, or if it is still busy with an action that
     /// a crash of the simulation ended.
     fn started(&mut self, world: &World) -> Result<&mut Session, ExternalFault> {
@@ -86,6 +97,7 @@ impl<'a> Performance<'a> {
             Some(session) => session,
             None => Session::start(
                 (&programs.skill, worker.number),
+                (&self.run.run, programs.sink.clone()),
                 &programs.tested,
                 world,
                 self.clock_secs,
@@ -110,6 +122,7 @@ impl<'a> Performance<'a> {
                     index,
                     seed,
                 },
+                (&run, world.time_secs()),
                 &stop,
             )
         })
@@ -119,7 +132,8 @@ impl<'a> Performance<'a> {
     fn give_up(&mut self, fault: ExternalFault) -> ExternalFault {
         if let Some(mut session) = self.lent.worker.session.take() {
             let fault = session.refuse(fault);
-            self.output = Some(session.end());
+            let ended = session.end();
+            (self.output, self.log) = (Some(ended.last_lines), ended.log);
             return self.named(fault);
         }
         self.named(fault)
@@ -189,6 +203,7 @@ impl ExternalSkill for Performance<'_> {
             }));
         };
         session.idle = false;
+        session.log.begin_action(robot.time_secs());
         robot.begin(&call.action);
         let (stop, grasped) = (&*self.stop, Grasped::default());
         let mut performed = Performed {
@@ -242,7 +257,8 @@ impl ExternalSkill for Performance<'_> {
         );
         match ready {
             Err(_) if is_decided => {
-                self.lent.worker.session.take().map(Session::end);
+                let ended = self.lent.worker.session.take().map(Session::end);
+                self.log = ended.unwrap_or_default().log;
                 Ok(())
             }
             ready => {
@@ -322,6 +338,8 @@ impl Performed<'_, '_> {
                     self.robot.count_request()?;
                     let (answer, bytes) = answer(&ask, self.robot);
                     let binaries: Vec<&[u8]> = bytes.iter().map(Vec::as_slice).collect();
+                    let size = binaries.iter().map(|binary| binary.len()).sum();
+                    self.session.log.ask(answer.record(&ask, size));
                     self.session
                         .send(&answer, &binaries)
                         .map_err(Interrupt::ExternalSkill)?;
@@ -359,7 +377,12 @@ impl Performed<'_, '_> {
             .controls(&self.session.joints)
             .map_err(Interrupt::ExternalSkill)?;
         self.robot.steer(&controls);
-        self.robot.step(ticks)?;
+        let stepped = self.robot.step(ticks);
+        let now = self.robot.time_secs();
+        self.session
+            .log
+            .command(&controls, &self.session.joints.names, now);
+        stepped?;
         let measured = self.robot.observe();
         self.grasped.feel(self.robot, &measured);
         let observed = Observed::of(self.robot, &measured, self.privileged);

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::{Mutex, PoisonError};
 
+use crate::log::LineSink;
 use crate::session::Session;
 use actcheck_config::Skill;
 
@@ -12,6 +13,8 @@ pub struct Programs {
     pub(super) skill: Skill,
     /// The actions of all tests.
     pub(super) tested: BTreeSet<String>,
+    /// Receives the lines that the programs print.
+    pub(super) sink: Option<LineSink>,
     workers: Mutex<Workers>,
 }
 
@@ -41,8 +44,14 @@ impl Programs {
         Self {
             skill,
             tested,
+            sink: None,
             workers: Mutex::default(),
         }
+    }
+
+    /// Sets the receiver of the lines that the programs print, for runs that begin from now on.
+    pub fn set_line_sink(&mut self, sink: LineSink) {
+        self.sink = Some(sink);
     }
 
     /// Takes a free worker, or creates one whose program is not started yet.

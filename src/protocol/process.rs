@@ -81,6 +81,8 @@ impl Process {
             std::io::pipe().map_err(|error| cannot("its output can't be captured", &error))?;
         let mut command = limited(skill);
         command
+            // Lines are printed when the program prints them; `[skill] env` may say otherwise.
+            .env("PYTHONUNBUFFERED", "1")
             .envs(&skill.env)
             .env("ACTCHECK_ADDRESS", &address)
             .env("ACTCHECK_PROTOCOL", PROTOCOL.to_string())
@@ -99,9 +101,9 @@ impl Process {
             .map_err(|error| cannot("it can't be started", &error))?;
         // The command also holds ends of the pipe.
         drop(command);
-        let output = Output::read(reader);
-        match guard(&child, folder) {
-            Ok(guard) => Ok(Self {
+        let made = Output::read(reader).and_then(|output| Ok((guard(&child, folder)?, output)));
+        match made {
+            Ok((guard, output)) => Ok(Self {
                 child,
                 guard,
                 folder: folder.to_path_buf(),

@@ -6,11 +6,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::frame::{Wire, out_of_turn};
 use crate::hello::{Joints, introduction};
+use crate::log::{LineSink, LogWriter};
 use crate::message::{Hello, PROTOCOL, Plain, ToProgram, kind_of, parse};
 use crate::process::Process;
 use actcheck_actions::ExternalFault;
 use actcheck_base::printable;
 use actcheck_config::Skill;
+use actcheck_data::SkillLog;
 use actcheck_world::World;
 
 /// Longest program name that is kept. Unit: characters.
@@ -30,6 +32,9 @@ pub struct Session {
     pub actions: BTreeSet<String>,
     /// Its display name.
     pub name: String,
+    /// The log of the present run.
+    pub log: LogWriter,
+    sink: Option<LineSink>,
     timeout_secs: f64,
     /// Number of bytes printed before the run.
     printed_before: u64,
@@ -39,6 +44,15 @@ pub struct Session {
     pub lost: bool,
     /// Whether it was notified of its fault and may exit by itself.
     refused: bool,
+}
+
+/// The rest of a program that was ended.
+#[derive(Debug, Default)]
+pub struct EndedSession {
+    /// The last lines that it printed.
+    pub last_lines: Vec<String>,
+    /// The log of its last run.
+    pub log: SkillLog,
 }
 
 impl Session {
@@ -51,6 +65,7 @@ impl Session {
     /// lines.
     pub fn start(
         (skill, worker): (&Skill, usize),
+        (run, sink): (&str, Option<LineSink>),
         tested: &BTreeSet<String>,
         world: &World,
         clock_secs: fn() -> f64,
@@ -77,6 +92,8 @@ impl Session {
             joints: Joints::of(world),
             actions: BTreeSet::new(),
             name: String::new(),
+            log: LogWriter::begin(run, sink.clone(), world.time_secs()),
+            sink,
             timeout_secs: (skill.startup_secs - (clock_secs() - began)).max(0.0),
             printed_before: 0,
             idle: true,
@@ -88,7 +105,7 @@ impl Session {
                 session.timeout_secs = skill.timeout_secs;
                 Ok(session)
             }
-            Err(fault) => Err((fault, session.end())),
+            Err(fault) => Err((fault, session.end().last_lines)),
         }
     }
 
@@ -145,11 +162,26 @@ impl Session {
         Ok(())
     }
 
+    /// The log of the run that ends. It is then empty.
+    pub fn take_log(&mut self) -> SkillLog {
+        self.log.print(self.process.output.take_rest());
+        self.log.finish()
+    }
+
     /// Begins a new run.
     ///
     /// # Errors
     /// A fault of the program, or `stop` is set.
-    pub fn reset(&mut self, reset: &ToProgram<'_>, stop: &AtomicBool) -> Result<(), ExternalFault> {
+    pub fn reset(
+        &mut self,
+        reset: &ToProgram<'_>,
+        (run, time_secs): (&str, f64),
+        stop: &AtomicBool,
+    ) -> Result<(), ExternalFault> {
+        // Lines that it printed when it was started are in the log of no run: which run started it
+        // depends on the number of workers.
+        self.log.print(self.process.output.take_rest());
+        self.log = LogWriter::begin(run, self.sink.clone(), time_secs);
         self.printed_before = self.process.output.n_bytes();
         self.send(reset, &[])?;
         let range = self.wait(&|| stop.load(Ordering::Relaxed))?;
@@ -251,18 +283,23 @@ impl Session {
     /// As [`Self::receive`].
     pub fn wait(&mut self, is_over: &dyn Fn() -> bool) -> Result<Range<usize>, ExternalFault> {
         let limit_secs = self.timeout_secs;
-        let (process, before) = (&mut self.process, self.printed_before);
-        let mut watch = || match process.output.n_bytes() - before {
-            too_much @ PRINTED_LIMIT.. => {
-                Err(broke(format!("it printed {too_much} bytes in one run")))
+        let (process, log, before) = (&mut self.process, &mut self.log, self.printed_before);
+        let mut watch = || {
+            log.print(process.output.take());
+            match process.output.n_bytes() - before {
+                too_much @ PRINTED_LIMIT.. => {
+                    Err(broke(format!("it printed {too_much} bytes in one run")))
+                }
+                _ if is_over() => Err(ExternalFault {
+                    late: true,
+                    reason: "its run was over".to_owned(),
+                }),
+                _ => process.ended().map_or(Ok(()), |how| Err(broke(how))),
             }
-            _ if is_over() => Err(ExternalFault {
-                late: true,
-                reason: "its run was over".to_owned(),
-            }),
-            _ => process.ended().map_or(Ok(()), |how| Err(broke(how))),
         };
         let received = self.wire.receive(limit_secs, &mut watch);
+        // What it printed before the message was printed at the same simulated time.
+        self.log.print(self.process.output.take());
         received.map_err(|fault| self.cause(fault))
     }
 
@@ -287,13 +324,17 @@ impl Session {
         fault
     }
 
-    /// Ends the program. Returns the last lines of its output.
-    pub fn end(mut self) -> Vec<String> {
+    /// Ends the program.
+    pub fn end(mut self) -> EndedSession {
         // A notified program may print a more informative message before it exits.
         if self.refused {
             self.process.ends_soon();
         }
-        self.process.end()
+        let last_lines = self.process.end();
+        EndedSession {
+            last_lines,
+            log: self.take_log(),
+        }
     }
 
     /// Asks the program to exit, waits briefly, and ends it.

@@ -28,7 +28,7 @@ pub use html::{
 };
 pub use json::{
     campaign_json, case_json, compare_json, engines_json, findings_json, health_json, labels_json,
-    oracles_json, recheck_json, relations_json, run_json, shrunk_json,
+    oracles_json, recheck_json, relations_json, run_json, shrunk_json, skill_json,
 };
 pub use picture::{
     Caption, Chart, Drawing, collisions_picture, patterns_picture, robot_picture, run_picture,
@@ -49,7 +49,7 @@ pub use table::{
     recheck_table, relations_table, with_shrunk,
 };
 pub use text::{
-    FailureLines, Page, campaign_result_text, campaign_text, case_text, compare_text, engines_text,
-    findings_text, health_lines, health_text, labels_text, oracles_text, recheck_text,
-    relations_text, run_text, scene_rule, shrunk_text,
+    FailureLines, Page, campaign_result_text, campaign_runs_text, campaign_text, case_text,
+    compare_text, engines_text, findings_text, health_lines, health_text, labels_text,
+    oracles_text, recheck_text, relations_text, run_text, scene_rule, shrunk_text, skill_text,
 };

@@ -13,7 +13,7 @@ FOREVER = 600
 KINDS = (
     "exit silent raise killed shut garbage short_garbage not_json not_object unknown_type unknown_key wrong_kind long_frame two "
     "drip unknown_joint finger joint_twice joint_in_two_lists no_ticks not_a_number infinite children runaway "
-    "zero_quaternion"
+    "zero_quaternion degrees millimetres"
 ).split()
 
 
@@ -81,6 +81,10 @@ def wrong(link, kind):
     elif kind == "infinite":
         text = f'{{"type": "command", "positions": {{"{joint}": 1e999}}}}'.encode()
         link.raw(len(text).to_bytes(4, "little") + b"J" + text)
+    elif kind == "degrees":
+        link.send({"type": "command", "positions": {link.hello["robot"]["arm_joints"][1]: -45}})
+    elif kind == "millimetres":
+        link.send({"type": "command", "gripper": {"opening_m": 80}})
     elif kind == "zero_quaternion":
         pose = {"position_m": [0, 0, 0], "quaternion_xyzw": [0, 0, 0, 0]}
         link.send({"type": "end", "succeeded": True, "held": {"pose": pose, "size_m": [0.1, 0.1, 0.1]}})

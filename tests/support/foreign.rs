@@ -50,6 +50,13 @@ pub fn client_python() -> &'static Path {
         .unwrap_or_else(|why| panic!("clients/python can't be installed for its tests: {why}"))
 }
 
+/// A search path with the Python of [`client_python`] first.
+pub fn client_path() -> std::ffi::OsString {
+    let bin = client_python().parent().unwrap().to_owned();
+    let others = std::env::var_os("PATH").unwrap_or_default();
+    std::env::join_paths(std::iter::once(bin).chain(std::env::split_paths(&others))).unwrap()
+}
+
 /// Python with maturin, and a folder with the package's dependencies from PyPI: later builds and
 /// installations of wheels need no network.
 pub fn maturin() -> Result<(PathBuf, PathBuf), String> {

@@ -206,6 +206,28 @@ class Hands(unittest.TestCase):
             self.robot.move_joints([0.0, 0.0, 0.0])
         self.assertEqual(self.commands(), [])
 
+    def test_a_target_beyond_a_limit_is_refused_with_its_unit(self) -> None:
+        lift = next(joint for joint in self.robot.description.joints if joint.name == "arm_lift_joint")
+        cases: list[tuple[Callable[[], Any], str]] = [
+            (lambda: self.robot.gripper(80), "the opening of the gripper is 80 m, but must be from 0 to .* m; its unit is m: 80 mm are 0.08 m"),
+            (lambda: self.robot.gripper(-0.1), "the opening of the gripper is -0.1 m, but must be from 0 to"),
+            (lambda: self.robot.gripper(0.0, force_n=-5.0), "the force of a finger is -5 N, but must be at least 0 N"),
+            (lambda: self.robot.move_joints({"wrist_flex_joint": 45}), "wrist_flex_joint is 45 rad, but .* 45 ° are 0.7854 rad"),
+            (lambda: self.robot.move_joints({"arm_lift_joint": 30}), "the position of arm_lift_joint is 30 m, .* 30 cm are 0.3 m"),
+            (lambda: self.robot.step(velocities={"arm_lift_joint": 50.0}), f"velocity of arm_lift_joint is 50 m/s, but must be from -{lift.velocity:.4g} to"),
+            (lambda: self.robot.step(efforts={"arm_lift_joint": 1e9}), r"effort of arm_lift_joint is 1e\+09 N, but must be"),
+            (lambda: self.robot.step(base_velocity=(90.0, 0.0, 0.0)), "the base velocity forwards is 90 m/s, but must be"),
+            (lambda: self.robot.step(base_velocity=(0.1, 0.0)), "has 3 numbers"),
+            (lambda: self.robot.step(head=(0.0, 40.0)), "head_tilt_joint is 40 rad, but"),
+            (lambda: self.robot.gripper(math.nan), "is nan, but must be finite"),
+        ]
+        for command, words in cases:
+            with self.assertRaisesRegex(ValueError, words):
+                command()
+        self.assertEqual(self.commands(), [])
+        self.robot.step({"arm_lift_joint": lift.upper + 0.005})
+        self.assertEqual(len(self.commands()), 1, "a rounding error is not refused")
+
     def test_fingers_close_until_they_stall(self) -> None:
         self.assertAlmostEqual(self.robot.gripper(0.135).opening_m, 0.135, 3)
         self.simulation.between_m = 0.08

@@ -11,6 +11,7 @@
 mod columns;
 mod events;
 mod input;
+mod joints;
 mod order;
 mod pack;
 mod page;

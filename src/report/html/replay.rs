@@ -9,8 +9,10 @@ use serde_json::{Value, json};
 
 use crate::html::Explained;
 use crate::html::events::action;
+use crate::html::joints::joints;
 use crate::html::pack::{Pack, packed};
 use crate::html::shapes::Shapes;
+use crate::json::skill_json;
 use crate::pressed::hardest_of_run;
 use actcheck_base::{Outcome, names};
 use actcheck_data::{Appearances, BodyState, Form, Pose, Role, SeenPart, Snapshot, Trace};
@@ -259,6 +261,9 @@ impl Bodies {
             pack.set("tracks", self.tracks.clone());
             set_trajectories(&mut pack, trace, &self.slots);
             pack.set("pressed", pressed(run, trace));
+            let joints = joints(&mut pack, trace);
+            pack.set("joints", joints);
+            pack.set("skill", skill_json(trace));
         }
         pack.finish()
     }

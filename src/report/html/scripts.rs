@@ -1,15 +1,17 @@
 //! The scripts and style sheets, in the order in which they are in the page.
 
-/// Style sheets: colours of both themes, the page, outcomes and plots, the list and the run view.
-pub(super) const STYLE: [&str; 4] = [
+/// Style sheets: colours of both themes, the page, outcomes and plots, the list and the run view,
+/// the side of a program.
+pub(super) const STYLE: [&str; 5] = [
     include_str!("web/colours.css"),
     include_str!("web/page.css"),
     include_str!("web/parts.css"),
     include_str!("web/runs.css"),
+    include_str!("web/skill.css"),
 ];
 
 /// Scripts. All share one scope; the last one starts the program.
-pub(super) const SCRIPT: [&str; 31] = [
+pub(super) const SCRIPT: [&str; 34] = [
     include_str!("web/dom.js"),
     include_str!("web/unpack.js"),
     include_str!("web/words.js"),
@@ -37,6 +39,9 @@ pub(super) const SCRIPT: [&str; 31] = [
     include_str!("web/orbit.js"),
     include_str!("web/stage.js"),
     include_str!("web/signals.js"),
+    include_str!("web/quantities.js"),
+    include_str!("web/chooser.js"),
+    include_str!("web/skill.js"),
     include_str!("web/timeline.js"),
     include_str!("web/player.js"),
     include_str!("web/run.js"),

@@ -108,7 +108,7 @@ fn pattern(causes: &Causes<'_>, pattern: &Pattern) -> Value {
         .map(|one| condition(one, &parameters[one.parameter()]))
         .collect();
     json!({
-        "sentence": causes.sentence(pattern),
+        "sentence": causes.sentence(pattern), "plain": causes.plain_sentence(pattern),
         "conditions": conditions,
         "all": table(pattern.all), "searched": table(pattern.searched), "held_out": table(pattern.held_out),
         "rate": pattern.rate, "elsewhere": pattern.elsewhere, "lift": pattern.lift, "wracc": pattern.wracc,

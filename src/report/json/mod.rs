@@ -16,6 +16,7 @@ mod relations;
 mod repeated;
 mod run;
 mod shrunk;
+mod skill;
 mod weighted;
 
 pub use campaign::campaign_json;
@@ -31,3 +32,4 @@ pub use recheck::recheck_json;
 pub use relations::relations_json;
 pub use run::run_json;
 pub use shrunk::shrunk_json;
+pub use skill::skill_json;

@@ -279,6 +279,27 @@ impl CampaignSummary {
             .option("--history", &self.history)
     }
 
+    /// The command that lists the runs that failed; all runs of the campaign if some did not
+    /// complete, which `--failed` leaves out.
+    pub(crate) fn failed_runs(&self) -> ShellLine {
+        let spoilt = self
+            .runs
+            .iter()
+            .any(|run| run.reason.is_some() && !run.failed());
+        ShellLine::new(&self.program)
+            .fixed(if spoilt { "list" } else { "list --failed" })
+            .option("--campaign", &self.campaign)
+            .option("--history", &self.history)
+    }
+
+    /// The command that makes the runs that an interrupted campaign lacks.
+    pub(crate) fn resume(&self) -> ShellLine {
+        ShellLine::new(&self.program)
+            .fixed("run")
+            .word(&format!("--resume={}", self.campaign))
+            .option("--history", &self.history)
+    }
+
     /// The paper's T over all runs. Returns `None` if there are no runs.
     pub fn total_score(&self) -> Option<f64> {
         mean(self.runs.iter().map(|run| run.score))

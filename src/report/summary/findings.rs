@@ -111,6 +111,28 @@ impl<'a> Causes<'a> {
         )
     }
 
+    /// Describes a pattern in a sentence without statistics: `CloseObject fails in 59 % of the runs in
+    /// which the robot saw the target 3.8 cm or more beside its place, and in 0.5 % of the others`.
+    pub fn plain_sentence(&self, pattern: &Pattern) -> String {
+        let conditions: Vec<String> = pattern
+            .conditions
+            .iter()
+            .map(|condition| {
+                plain_condition(condition, &self.input.parameters[condition.parameter()])
+            })
+            .collect();
+        let others = match pattern.elsewhere {
+            Some(elsewhere) => format!(", and in {} of the others", percent(elsewhere.rate)),
+            None => String::new(),
+        };
+        format!(
+            "{} fails in {} of the runs in which {}{others}",
+            self.report.name(),
+            percent(pattern.rate.rate),
+            conditions.join(" and ")
+        )
+    }
+
     /// Describes one of the strongest conditions in one sentence.
     pub fn strongest_sentence(&self, strongest: &Strongest) -> String {
         let all = strongest.all;
@@ -195,19 +217,91 @@ pub(crate) fn percent(share: f64) -> String {
     }
 }
 
+/// A number of a condition with its unit: lengths below a metre in centimetres, with as many digits
+/// as the number has.
+fn quantity(value: f64, unit: Option<&str>) -> String {
+    match unit {
+        Some("m") if value.abs() < 1.0 => {
+            let shown = format!("{:.2}", value * 100.0);
+            let shown = shown.trim_end_matches('0').trim_end_matches('.');
+            format!("{shown} cm")
+        }
+        Some(unit) => format!("{value} {unit}"),
+        None => value.to_string(),
+    }
+}
+
+/// Describes a condition as a clause: `the target friction is below 0.35`, or `the robot saw the
+/// target 3.8 cm or more beside its place`.
+fn plain_condition(condition: &Condition, parameter: &Parameter) -> String {
+    let unit = parameter.unit.as_deref();
+    let bare = bare_name(parameter);
+    let value = |value: f64| quantity(value, unit);
+    if let (Some(of), Condition::Range { low, high, .. }) = (bare.strip_prefix(DRAWN), condition) {
+        let amount = match (low, high) {
+            (Some(low), Some(high)) => format!("{} to {}", value(*low), value(*high)),
+            (Some(low), None) => format!("{} or more", value(*low)),
+            (None, Some(high)) => format!("less than {}", value(*high)),
+            (None, None) => "any distance".to_owned(),
+        };
+        if let Some(thing) = of.strip_suffix("_xy") {
+            let thing = thing.replace('_', " ");
+            return format!("the robot saw the {thing} {amount} beside its place");
+        }
+    }
+    let name = match bare.strip_prefix(DRAWN) {
+        Some(of) => format!("the error of {}", of.replace('_', " ")),
+        None => format!("the {}", bare.replace('_', " ")),
+    };
+    match condition {
+        Condition::Kind { kind, .. } => {
+            let thing = bare
+                .strip_suffix("_category")
+                .or_else(|| bare.strip_suffix("_model"))
+                .unwrap_or(bare);
+            format!("the {} is of the kind {kind}", thing.replace('_', " "))
+        }
+        Condition::Range {
+            low: Some(low),
+            high: Some(high),
+            ..
+        } => format!("{name} is from {} to {}", value(*low), value(*high)),
+        Condition::Range { low: Some(low), .. } => format!("{name} is at least {}", value(*low)),
+        Condition::Range {
+            high: Some(high), ..
+        } => format!("{name} is below {}", value(*high)),
+        Condition::Range { .. } => format!("{name} has any value"),
+        Condition::Arc { from, to, .. } if *from == -to => {
+            format!("{name} is beyond ±{}", value(*from))
+        }
+        Condition::Arc { from, to, .. } => {
+            format!(
+                "{name} is at least {} or below {}",
+                value(*from),
+                value(*to)
+            )
+        }
+    }
+}
+
+/// The name of a parameter without its unit.
+fn bare_name(parameter: &Parameter) -> &str {
+    match &parameter.unit {
+        Some(unit) => parameter
+            .name
+            .strip_suffix(&format!("_{}", unit.to_lowercase()))
+            .unwrap_or(&parameter.name),
+        None => &parameter.name,
+    }
+}
+
 /// Describes a condition, such as `target friction < 0.35`.
 fn condition_text(condition: &Condition, parameter: &Parameter) -> String {
     let unit = parameter
         .unit
         .as_ref()
         .map_or_else(String::new, |unit| format!(" {unit}"));
-    let bare = match &parameter.unit {
-        Some(unit) => parameter
-            .name
-            .strip_suffix(&format!("_{}", unit.to_lowercase()))
-            .unwrap_or(&parameter.name),
-        None => &parameter.name,
-    };
+    let bare = bare_name(parameter);
     let name = match bare.strip_prefix(DRAWN) {
         Some(of) => format!("drawn error of {}", of.replace('_', " ")),
         None => bare.replace('_', " "),

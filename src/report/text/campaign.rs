@@ -9,41 +9,67 @@ use crate::text::weighted::weighted_text;
 use crate::text::{Page, by_action, command, fit, fitted, regressions_text, ruled};
 use crate::{CampaignSummary, PropertyLine, Proportion, RateBounds, RunSummary};
 use actcheck_analysis::Sampling;
-use actcheck_base::{Outcome, ShellLine, names};
+use actcheck_base::{Judgement, Outcome, ShellLine, names};
 use actcheck_history::SkillRecord;
 
 /// Maximum number of rows in the table of runs. The text names the command that lists the rest.
 const RUNS_SHOWN: usize = 40;
-/// Maximum number of failed runs that are described in words.
-const FAILURES_SHOWN: usize = 20;
+/// Maximum number of kinds of failures that are described.
+const KINDS_SHOWN: usize = 8;
+/// Maximum number of runs of a kind of failure that are described.
+const RUNS_OF_A_KIND: usize = 3;
 
-/// Formats the table of runs × properties, the scores, and the witness of each failed property.
+/// Formats the pass rates of the properties, the scores, and the kinds of failures with examples.
 pub fn campaign_text(summary: &CampaignSummary, page: Page) -> String {
+    let mut out = regressions(summary);
+    if by_action::has_several_actions(summary) {
+        out.push_str(&by_action::scores_table(summary, &[], page));
+        out.push('\n');
+    }
+    tables(&mut out, summary, page);
+    scores(&mut out, summary);
+    out.push_str(&failures_text(summary));
+    remarks(&mut out, summary);
+    page.set(&out)
+}
+
+/// As [`campaign_text`], with a table of the runs. Failures are only counted: they were printed when
+/// they happened.
+pub fn campaign_runs_text(summary: &CampaignSummary, page: Page) -> String {
+    let mut out = regressions(summary);
+    runs_table(&mut out, summary, page);
+    out.push('\n');
+    tables(&mut out, summary, page);
+    scores(&mut out, summary);
+    for kind in kinds(summary) {
+        let _ = writeln!(out, "{}", kind.title(summary));
+    }
+    remarks(&mut out, summary);
+    page.set(&out)
+}
+
+/// Formats only the result: scores, and the kinds of failures with examples.
+pub fn campaign_result_text(summary: &CampaignSummary, page: Page) -> String {
+    let mut out = regressions_text(&summary.regressions);
+    scores(&mut out, summary);
+    out.push_str(&failures_text(summary));
+    page.set(&out)
+}
+
+fn regressions(summary: &CampaignSummary) -> String {
     let mut out = regressions_text(&summary.regressions);
     if !out.is_empty() {
         out.push('\n');
     }
-    runs_table(&mut out, summary, page);
-    out.push('\n');
-    out.push_str(&properties_text(summary, page));
-    out.push('\n');
-    repeated_text(&mut out, summary, page);
-    weighted_text(&mut out, summary, page);
-    scores(&mut out, summary);
-    failure_modes(&mut out, summary);
-    remarks(&mut out, summary);
-    failures(&mut out, summary);
-    page.set(&out)
+    out
 }
 
-/// Formats only the result: scores, which properties fail together, and the witness of each failed
-/// property.
-pub fn campaign_result_text(summary: &CampaignSummary, page: Page) -> String {
-    let mut out = regressions_text(&summary.regressions);
-    scores(&mut out, summary);
-    failure_modes(&mut out, summary);
-    failures(&mut out, summary);
-    page.set(&out)
+/// The tables of properties and of repeated or weighted scenes.
+fn tables(out: &mut String, summary: &CampaignSummary, page: Page) {
+    out.push_str(&properties_text(summary, page));
+    out.push('\n');
+    repeated_text(out, summary, page);
+    weighted_text(out, summary, page);
 }
 
 fn runs_table(out: &mut String, summary: &CampaignSummary, page: Page) {
@@ -247,29 +273,45 @@ fn pass_rate(line: &PropertyLine) -> String {
 }
 
 fn scores(out: &mut String, summary: &CampaignSummary) {
-    let score =
-        |value: Option<f64>| value.map_or_else(|| "none".to_owned(), |value| format!("{value:.4}"));
-    let broken = summary.runs.len()
-        - summary
-            .runs
-            .iter()
-            .filter(|run| run.reason.is_none())
-            .count();
+    let of = |count: usize| match count {
+        1 => "1 run".to_owned(),
+        count => format!("{count} runs"),
+    };
+    if let Some(rate) = summary.pass_rate() {
+        let _ = writeln!(out, "everything passed in {rate} runs");
+    }
+    let score = |value: f64| format!("{value:.2}");
+    let total = summary.total_score();
+    let _ = write!(
+        out,
+        "score T = {} over {}",
+        total.map_or_else(|| "none".to_owned(), score),
+        of(summary.runs.len())
+    );
+    let spoilt = summary
+        .runs
+        .iter()
+        .filter(|run| run.reason.is_some())
+        .count();
+    let whole = summary.total_score_without_broken();
+    if let Some(whole) = whole.filter(|whole| Some(*whole) != total) {
+        let _ = write!(out, ", {} without broken runs", score(whole));
+    }
+    if spoilt > 0 {
+        let _ = write!(out, "; {} did not complete", of(spoilt));
+    }
+    match summary.discards {
+        0 => {}
+        1 => out.push_str("; 1 scene discarded"),
+        several => {
+            let _ = write!(out, "; {several} scenes discarded");
+        }
+    }
     let _ = writeln!(
         out,
-        "T = {} over {} (without broken runs {}); {} did not complete; {} scenes discarded",
-        score(summary.total_score()),
-        match summary.runs.len() {
-            1 => "1 run".to_owned(),
-            count => format!("{count} runs"),
-        },
-        score(summary.total_score_without_broken()),
-        broken,
-        summary.discards,
+        "; campaign {} in {}",
+        summary.campaign, summary.history
     );
-    if let Some(rate) = summary.pass_rate() {
-        let _ = writeln!(out, "runs in which everything passed: {}", rate);
-    }
     if let Some(RateBounds {
         lost,
         as_failures,
@@ -296,12 +338,12 @@ fn scores(out: &mut String, summary: &CampaignSummary) {
     if summary.interrupted {
         let _ = writeln!(
             out,
-            "stopped early: {} of {} planned runs; all of these are in the history",
+            "stopped early: {} of {} planned runs, which are in the history; the others: {}",
             summary.runs.len(),
-            summary.planned
+            summary.planned,
+            command(&summary.resume())
         );
     }
-    let _ = writeln!(out, "campaign {} in {}", summary.campaign, summary.history);
 }
 
 /// Says which rates and intervals are printed if outcomes ended the campaign.
@@ -321,29 +363,6 @@ fn sampling_note(summary: &CampaignSummary) -> &'static str {
     }
 }
 
-/// Writes which properties fail together, and how often.
-fn failure_modes(out: &mut String, summary: &CampaignSummary) {
-    let modes = summary
-        .failure_modes
-        .iter()
-        .filter(|mode| !mode.failed.is_empty());
-    for mode in modes {
-        let failed: Vec<&str> = mode.failed.iter().map(|iri| names::local(iri)).collect();
-        let example = mode.runs.first().map_or("", String::as_str);
-        let (low, high) = (mode.share.low * 100.0, mode.share.high * 100.0);
-        let share = match summary.mode_share(mode).rate {
-            Some(rate) => format!("{:.0} % [{low:.0}–{high:.0}]", rate * 100.0),
-            None => format!("[{low:.0}–{high:.0} %]"),
-        };
-        let _ = writeln!(
-            out,
-            "  {share} of the runs ({}, such as {example}) fail {}",
-            mode.runs.len(),
-            failed.join(" + ")
-        );
-    }
-}
-
 /// Writes warnings about properties whose outcomes may be misleading.
 fn remarks(out: &mut String, summary: &CampaignSummary) {
     if summary.privileged {
@@ -355,51 +374,139 @@ fn remarks(out: &mut String, summary: &CampaignSummary) {
     }
 }
 
-fn failures(out: &mut String, summary: &CampaignSummary) {
-    let shown: Vec<&RunSummary> = summary
-        .runs
-        .iter()
-        .filter(|run| run.failed() || run.reason.is_some())
-        .collect();
-    for run in shown.iter().take(FAILURES_SHOWN) {
-        let _ = writeln!(out, "\n{} ({})", run.id, run.test);
-        if let Some(reason) = &run.reason {
-            let _ = writeln!(out, "  {}: {reason}", run.status.word());
+/// Runs that failed in the same properties, or did not complete for the same reason.
+struct Kind<'a> {
+    /// IRIs of the failed properties, sorted; empty if none failed.
+    failed: Vec<&'a str>,
+    runs: Vec<&'a RunSummary>,
+}
+
+/// The kinds of failures: most frequent first, then in the order of their first runs.
+fn kinds(summary: &CampaignSummary) -> Vec<Kind<'_>> {
+    let mut kinds: Vec<(String, Kind<'_>)> = Vec::new();
+    for run in &summary.runs {
+        if !run.failed() && run.reason.is_none() {
+            continue;
         }
-        for action in &run.actions {
-            for judgement in action
-                .judgements
-                .iter()
-                .filter(|j| j.outcome == Outcome::Failed)
-            {
-                let property = summary
-                    .properties
+        let mut failed: Vec<&str> = failed_of(run)
+            .map(|(_, judgement)| judgement.property.as_str())
+            .collect();
+        failed.sort_unstable();
+        failed.dedup();
+        // Reasons that differ only in numbers, such as times, are the same kind.
+        let reason = run.reason.as_deref().unwrap_or_default();
+        let reason = reason.chars().filter(|letter| !letter.is_ascii_digit());
+        let key = format!("{}\n{}", failed.join(" "), reason.collect::<String>());
+        match kinds.iter_mut().find(|(known, _)| *known == key) {
+            Some((_, kind)) => kind.runs.push(run),
+            None => kinds.push((
+                key,
+                Kind {
+                    failed,
+                    runs: vec![run],
+                },
+            )),
+        }
+    }
+    kinds.sort_by_key(|(_, kind)| std::cmp::Reverse(kind.runs.len()));
+    kinds.into_iter().map(|(_, kind)| kind).collect()
+}
+
+fn failed_of(run: &RunSummary) -> impl Iterator<Item = (&str, &Judgement)> {
+    run.actions.iter().flat_map(|action| {
+        let failed = action.judgements.iter();
+        failed
+            .filter(|judgement| judgement.outcome == Outcome::Failed)
+            .map(move |judgement| (action.name.as_str(), judgement))
+    })
+}
+
+impl Kind<'_> {
+    /// `3 runs (20 % [7–45]) fail CloseObject + MovedObject`
+    fn title(&self, summary: &CampaignSummary) -> String {
+        let count = self.runs.len();
+        let runs = if count == 1 { "run" } else { "runs" };
+        let spoilt = self.runs.iter().find(|run| run.reason.is_some());
+        let words = match (spoilt, self.failed.is_empty()) {
+            (Some(run), true) => return format!("{count} {runs} {}", run.status.word()),
+            (Some(run), false) => format!("{} and ", run.status.word()),
+            (None, _) => String::new(),
+        };
+        let mode = summary.failure_modes.iter().find(|mode| {
+            mode.failed.len() == self.failed.len()
+                && self
+                    .failed
                     .iter()
-                    .find(|(iri, ..)| *iri == judgement.property);
-                let label =
-                    property.map_or(judgement.property.as_str(), |(_, label, _)| label.as_str());
-                let _ = writeln!(
-                    out,
-                    "  {} failed: {label}: {}",
-                    action.name, judgement.witness
-                );
+                    .all(|iri| mode.failed.iter().any(|of| of == iri))
+        });
+        let share = mode
+            .filter(|_| spoilt.is_none())
+            .map_or_else(String::new, |mode| {
+                let (low, high) = (mode.share.low * 100.0, mode.share.high * 100.0);
+                match summary.mode_share(mode).rate {
+                    Some(rate) => format!(" ({:.0} % [{low:.0}–{high:.0}])", rate * 100.0),
+                    None => format!(" ([{low:.0}–{high:.0} %])"),
+                }
+            });
+        let fail = if count == 1 { "fails" } else { "fail" };
+        let names: Vec<&str> = self.failed.iter().map(|iri| names::local(iri)).collect();
+        format!("{count} {runs}{share} {words}{fail} {}", names.join(" + "))
+    }
+}
+
+/// The kinds of failures, each with the first reasons of its first runs, and the command for more.
+fn failures_text(summary: &CampaignSummary) -> String {
+    let mut out = String::new();
+    let kinds = kinds(summary);
+    let several = by_action::has_several_actions(summary);
+    for kind in kinds.iter().take(KINDS_SHOWN) {
+        let _ = writeln!(out, "\n{}:", kind.title(summary));
+        for run in kind.runs.iter().take(RUNS_OF_A_KIND) {
+            let reason = match (&run.reason, failed_of(run).next()) {
+                (Some(reason), _) => reason.clone(),
+                (None, Some((action, judgement))) => {
+                    let action = if several {
+                        format!("{action}: ")
+                    } else {
+                        String::new()
+                    };
+                    format!("{action}{}", judgement.witness)
+                }
+                (None, None) => String::new(),
+            };
+            let _ = writeln!(out, "  {}  {reason}", run.id);
+        }
+        match kind.runs.len().saturating_sub(RUNS_OF_A_KIND) {
+            0 => {}
+            more => {
+                let _ = writeln!(out, "  … {more} more");
             }
         }
-        let show = ShellLine::new(&summary.program)
-            .fixed("show")
-            .word(&run.id)
-            .option("--history", &summary.history);
-        let more = command(&show);
-        let _ = writeln!(out, "  more: {more}");
     }
-    if shown.len() > FAILURES_SHOWN {
-        let more = command(&summary.all_runs());
-        let _ = writeln!(
-            out,
-            "\n{} more runs did not pass: {more}",
-            shown.len() - FAILURES_SHOWN
-        );
+    if kinds.len() > KINDS_SHOWN {
+        let more: usize = kinds[KINDS_SHOWN..]
+            .iter()
+            .map(|kind| kind.runs.len())
+            .sum();
+        let _ = writeln!(out, "\n{more} runs failed in other ways");
     }
+    let Some(first) = kinds.first().and_then(|kind| kind.runs.first()) else {
+        return out;
+    };
+    let show = ShellLine::new(&summary.program)
+        .fixed("show")
+        .word(&first.id)
+        .option("--history", &summary.history);
+    let _ = writeln!(out, "more: {}", command(&show));
+    let shown: usize = kinds
+        .iter()
+        .take(KINDS_SHOWN)
+        .map(|kind| kind.runs.len().min(RUNS_OF_A_KIND))
+        .sum();
+    if shown < kinds.iter().map(|kind| kind.runs.len()).sum() {
+        let _ = writeln!(out, "all of them: {}", command(&summary.failed_runs()));
+    }
+    out
 }
 
 #[cfg(test)]
@@ -416,7 +523,7 @@ mod tests {
         ]);
         let text = campaign_text(&summary, Page::default());
         assert!(
-            text.contains("Pick failed: property 1: glass_1 moved 0.4 cm, needs more than 2 cm"),
+            text.contains("fails p1:\n  k7f3-1  glass_1 moved 0.4 cm, needs more than 2 cm"),
             "{text}"
         );
         assert!(
@@ -425,11 +532,14 @@ mod tests {
         );
         assert!(
             text.contains(
-                "T = 0.2500 over 2 runs (without broken runs 0.5000); 1 did not complete"
+                "score T = 0.25 over 2 runs, 0.50 without broken runs; 1 run did not complete"
             ),
             "{text}"
         );
-        assert!(text.contains("broken: body left the world"), "{text}");
+        assert!(
+            text.contains("1 run broken:\n  k7f3-2  body left the world"),
+            "{text}"
+        );
         assert!(!text.contains('\u{1b}'), "no colours unless requested");
     }
 }

@@ -5,24 +5,18 @@ use crate::text::{Page, command};
 use actcheck_base::{Outcome, ShellLine};
 use actcheck_history::RunStatus;
 
-/// Longest reason of a failure in one line; of a longer one, only the first part is printed. Unit:
-/// characters.
-const LONGEST_REASON: usize = 90;
-
 /// The text about a run that failed or did not complete.
 pub struct FailureLines<'a> {
     /// The run.
     pub run: &'a RunSummary,
     /// The command that shows the run.
     pub show: &'a ShellLine,
-    /// Whether all its failed properties are printed with their whole reasons.
-    pub all: bool,
     /// Returns the name of a property.
     pub name: &'a dyn Fn(&str) -> String,
 }
 
 impl FailureLines<'_> {
-    /// The run with the first of its failed properties and the reason, then the command.
+    /// The run with its failed properties and their reasons, then the command.
     pub fn text(&self, page: Page) -> String {
         let run = self.run;
         let failed: Vec<(String, &str)> = run
@@ -43,41 +37,13 @@ impl FailureLines<'_> {
                 .iter()
                 .map(|(name, witness)| format!("{name}: {witness}")),
         );
-        match reasons.first() {
-            _ if self.all => reasons
-                .iter()
-                .for_each(|reason| out.push_str(&format!("\n  {reason}"))),
-            Some(first) => {
-                out.push_str(&format!(": {}", shortened(first)));
-                match reasons.len() {
-                    1 => {}
-                    2 => out.push_str("; and 1 more property"),
-                    all => out.push_str(&format!("; and {} more properties", all - 1)),
-                }
-            }
-            None => {}
+        for reason in reasons {
+            out.push_str(&format!("\n  {reason}"));
         }
         page.set(&format!(
             "{out}\n  {}\n",
             painted(&format!("more: {}", command(self.show)), "2", page)
         ))
-    }
-
-    /// The line after the last failure that is printed. `list` is a command that lists all.
-    pub fn further(list: &ShellLine, page: Page) -> String {
-        let list = painted(&command(list), "2", page);
-        page.set(&format!(
-            "… further failures are not printed here (`-v` prints all): {list}\n"
-        ))
-    }
-}
-
-/// The first part of a reason that is too long for a line.
-fn shortened(reason: &str) -> String {
-    let too_long = reason.chars().count() > LONGEST_REASON;
-    match reason.split_once("; ").filter(|_| too_long) {
-        Some((first, _)) => format!("{first}; …"),
-        None => reason.to_owned(),
     }
 }
 
@@ -95,49 +61,36 @@ mod tests {
     use crate::summary::campaign_samples::run;
     use Outcome::{Broken, Failed, Passed};
 
-    fn lines(run: &RunSummary, all: bool, page: Page) -> String {
+    fn lines(run: &RunSummary, page: Page) -> String {
         let name = |iri: &str| iri.rsplit('#').next().unwrap_or(iri).to_owned();
         let show = ShellLine::default().fixed("actcheck show k7f3-1 --history h");
         FailureLines {
             run,
             show: &show,
-            all,
             name: &name,
         }
         .text(page)
     }
 
     #[test]
-    fn a_failure_is_one_line_with_its_first_reason_and_a_command() {
+    fn a_failure_has_a_line_for_each_property_and_a_command() {
         let one = run(0, RunStatus::Completed, &[Passed, Failed]);
-        let text = lines(&one, false, Page::default());
+        let text = lines(&one, Page::default());
         let end = ": glass_1 moved 0.4 cm, needs more than 2 cm\n  more: actcheck show k7f3-1 --history h\n";
         assert!(
-            text.starts_with("failed k7f3-1 (Pick): ") && text.ends_with(end),
+            text.starts_with("failed k7f3-1 (Pick)\n  ") && text.ends_with(end),
             "{text}"
         );
         let two = run(0, RunStatus::Completed, &[Failed, Failed]);
-        assert!(
-            lines(&two, false, Page::default()).contains("; and 1 more property\n"),
-            "{text}"
-        );
-        let all = lines(&two, true, Page::default());
-        assert_eq!(
-            all.matches("\n  ").count(),
-            3,
-            "one line for each property and the command:\n{all}"
-        );
+        let text = lines(&two, Page::default());
+        assert_eq!(text.matches("\n  ").count(), 3, "{text}");
     }
 
     #[test]
     fn a_broken_run_is_printed_with_its_reason() {
-        let text = lines(
-            &run(0, RunStatus::Broken, &[Broken]),
-            false,
-            Page::default(),
-        );
+        let text = lines(&run(0, RunStatus::Broken, &[Broken]), Page::default());
         assert!(
-            text.starts_with("broken k7f3-1 (Pick): body left the world\n"),
+            text.starts_with("broken k7f3-1 (Pick)\n  body left the world\n"),
             "{text}"
         );
     }
@@ -145,16 +98,13 @@ mod tests {
     #[test]
     fn colours_and_narrow_pages_change_no_word() {
         let failed = run(0, RunStatus::Completed, &[Failed, Failed, Failed]);
-        let plain = lines(&failed, false, Page::default());
+        let plain = lines(&failed, Page::default());
         for width in [50, 200] {
-            let text = lines(
-                &failed,
-                false,
-                Page {
-                    width: Some(width),
-                    colour: true,
-                },
-            );
+            let page = Page {
+                width: Some(width),
+                colour: true,
+            };
+            let text = lines(&failed, page);
             assert!(
                 text.starts_with("\u{1b}[31mfailed\u{1b}[0m k7f3-1"),
                 "{text}"
@@ -174,10 +124,5 @@ mod tests {
             };
             assert_eq!(words(&bare), words(&plain));
         }
-        let long = shortened(&format!(
-            "Detected: {} was seen; b was seen",
-            "a".repeat(90)
-        ));
-        assert!(long.ends_with("was seen; …"), "{long}");
     }
 }

@@ -16,7 +16,9 @@ const MAX_LISTED: usize = 8;
 const MAX_LINES: usize = 10;
 /// Formats counts, failure modes, cascades and collisions, then each property with its patterns,
 /// margins, trend, flaky scenes and heat maps.
-pub fn findings_text(summary: &FindingsSummary, page: Page) -> String {
+///
+/// Patterns are sentences; with `figures`, each has its statistics, too.
+pub fn findings_text(summary: &FindingsSummary, figures: bool, page: Page) -> String {
     let mut out = String::new();
     let campaigns = list(summary.campaigns.iter().map(String::as_str));
     let plural = if summary.campaigns.len() == 1 {
@@ -55,7 +57,7 @@ pub fn findings_text(summary: &FindingsSummary, page: Page) -> String {
     cascades(&mut out, summary);
     collisions(&mut out, &summary.collisions, page);
     for report in &summary.properties {
-        property(&mut out, report, summary, page);
+        property(&mut out, report, summary, (figures, page));
     }
     page.set(&out)
 }
@@ -160,7 +162,12 @@ fn cascades(out: &mut String, summary: &FindingsSummary) {
     rest(out, summary.cascades.len());
 }
 
-fn property(out: &mut String, report: &PropertyReport, summary: &FindingsSummary, page: Page) {
+fn property(
+    out: &mut String,
+    report: &PropertyReport,
+    summary: &FindingsSummary,
+    (figures, page): (bool, Page),
+) {
     let found = &report.findings;
     let _ = write!(
         out,
@@ -183,7 +190,7 @@ fn property(out: &mut String, report: &PropertyReport, summary: &FindingsSummary
         let _ = writeln!(out, "  {}", counts(found.counts));
     }
     if found.counts.failed > 0 {
-        patterns(out, report, summary);
+        patterns(out, report, summary, figures);
     }
     margins(out, report);
     trend(out, report);
@@ -208,23 +215,36 @@ fn property(out: &mut String, report: &PropertyReport, summary: &FindingsSummary
     report.maps.iter().for_each(|shown| map(out, shown, page));
 }
 
-fn patterns(out: &mut String, report: &PropertyReport, summary: &FindingsSummary) {
+fn patterns(out: &mut String, report: &PropertyReport, summary: &FindingsSummary, figures: bool) {
     let found = &report.findings;
+    let described = |out: &mut String, causes: &Causes<'_>, mark: String, pattern: &Pattern| {
+        if figures {
+            let _ = writeln!(out, "  {mark} {}", causes.sentence(pattern));
+            evidence(out, causes, pattern);
+        } else {
+            let _ = writeln!(out, "  {mark} {}", causes.plain_sentence(pattern));
+            confirmed(out, causes, pattern);
+        }
+    };
     out.push_str("  when (conditions: the scene and the errors drawn):\n");
     for (number, pattern) in found.patterns.confirmed().enumerate() {
-        let _ = writeln!(out, "  {}. {}", number + 1, report.sentence(pattern));
-        evidence(out, &report.when(), pattern);
+        described(out, &report.when(), format!("{}.", number + 1), pattern);
         more_scenes(out, report, pattern, summary, number + 1);
     }
     strongest(out, &report.when(), "condition");
-    searched(out, report.when(), summary);
+    if figures {
+        searched(out, report.when(), summary);
+    }
     out.push_str("  how (effects during the action):\n");
     for pattern in found.effects.patterns.confirmed() {
-        let _ = writeln!(out, "   - {}", report.how().sentence(pattern));
-        evidence(out, &report.how(), pattern);
+        described(out, &report.how(), " -".to_owned(), pattern);
     }
     strongest(out, &report.how(), "effect");
-    searched(out, report.how(), summary);
+    if figures {
+        searched(out, report.how(), summary);
+    } else {
+        out.push_str("  (`-v` prints intervals, p-values, and the extent of the search)\n");
+    }
     if found.twins + found.repeated > 0 {
         let _ = writeln!(
             out,
@@ -309,6 +329,18 @@ fn searched(out: &mut String, causes: Causes<'_>, summary: &FindingsSummary) {
             patterns.combined
         );
     }
+}
+
+/// Writes how often a pattern failed in the runs that were held out to confirm it.
+fn confirmed(out: &mut String, causes: &Causes<'_>, pattern: &Pattern) {
+    let held_out = pattern.held_out;
+    let _ = writeln!(
+        out,
+        "     confirmed on runs that were held out: {} of {} fail; runs: {}",
+        held_out.failed_in,
+        held_out.failed_in + held_out.passed_in,
+        list(causes.runs(pattern).into_iter())
+    );
 }
 
 fn evidence(out: &mut String, causes: &Causes<'_>, pattern: &Pattern) {

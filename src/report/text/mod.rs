@@ -21,9 +21,10 @@ mod ruled;
 mod run;
 mod scene_rule;
 mod shrunk;
+mod skill;
 mod weighted;
 
-pub use campaign::{campaign_result_text, campaign_text};
+pub use campaign::{campaign_result_text, campaign_runs_text, campaign_text};
 pub use case::case_text;
 pub(crate) use case::regressions_text;
 pub use compare::compare_text;
@@ -41,3 +42,4 @@ pub(crate) use ruled::{align, fit, fitted, ruled, stacked};
 pub use run::run_text;
 pub use scene_rule::scene_rule;
 pub use shrunk::shrunk_text;
+pub use skill::skill_text;

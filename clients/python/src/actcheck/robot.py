@@ -15,6 +15,7 @@ from actcheck.messages import (
     Call,
     DepthImage,
     Held,
+    Joint,
     Observation,
     Plane,
     Report,
@@ -39,6 +40,10 @@ STALLED_TICKS = 10
 FELT_SHARE = 0.7
 #: Longest time for the fingers to move. Unit: seconds.
 LONGEST_GRIP_S = 2.5
+
+
+#: Targets beyond a limit by less than this share of it, or by less than this distance, are rounding errors.
+SLACK_SHARE, SLACK = 0.01, 0.01
 
 
 class Ended(BaseException):
@@ -116,6 +121,8 @@ class Robot:
     ) -> Observation:
         """Sends one command and returns the observation after its ticks. Anything not named keeps its previous target.
 
+        Raises `ValueError` for an unknown joint and for a target beyond its limits, such as degrees or millimetres.
+
         `positions`, `velocities` and `efforts` by joint; `base_velocity` forwards, to the left (m/s) and turning (rad/s), in
         the base's frame; `gripper` as the gap between the fingers (metres), or as gap and force (newtons); `head` as pan and
         tilt (radians), `None` for one that keeps its target.
@@ -129,14 +136,15 @@ class Robot:
         if efforts is not None:
             message["efforts"] = self._checked(efforts, "effort")
         if base_velocity is not None:
-            message["base_velocity"] = [float(value) for value in base_velocity]
+            message["base_velocity"] = self._checked_base(base_velocity)
         if gripper is not None:
             opening, force = gripper if isinstance(gripper, tuple) else (gripper, self.description.grip_force_n)
-            message["gripper"] = {"opening_m": float(opening), "force_n": float(force)}
+            message["gripper"] = {"opening_m": self._checked_opening(opening), "force_n": self._checked_force(force)}
         if head is not None:
             pan, tilt = head
-            turned = {"pan_rad": pan, "tilt_rad": tilt}
+            turned = dict(zip(("pan_rad", "tilt_rad"), (pan, tilt)))
             message["head"] = {name: float(angle) for name, angle in turned.items() if angle is not None}
+            self._checked({joint: angle for joint, angle in zip(self.description.head_joints, (pan, tilt)) if angle is not None}, "position")
         return self._command(message)
 
     def wait(self, seconds: float) -> Observation:
@@ -295,4 +303,44 @@ class Robot:
             checked[name] = number = float(value)
             if not math.isfinite(number):
                 raise ValueError(f"the {what} of {name} is {number}, but must be finite")
+            self._check_limit(self.description.joints[self._numbers[name]], what, number)
         return checked
+
+    def _check_limit(self, joint: Joint, what: str, number: float) -> None:
+        """Raises `ValueError` if a target of a joint is beyond its limits."""
+        metres = joint.kind == "prismatic"
+        unit = {"position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "effort": ("N·m", "N")}[what][metres]
+        most = {"velocity": joint.velocity, "effort": joint.effort}.get(what)
+        low, high = (joint.lower, joint.upper) if most is None else (-most, most)
+        within(f"the {what} of {joint.name}", number, (low, high), unit)
+
+    def _checked_base(self, velocity: Sequence[float]) -> list[float]:
+        checked = [float(value) for value in velocity]
+        if len(checked) != 3:
+            raise ValueError(f"a base velocity has 3 numbers (forwards, left, turning), not {len(checked)}")
+        base = [self.description.joints[self._numbers[name]] for name in self.description.base_joints]
+        for name, value, joint, unit in zip(("forwards", "to the left", "of turning"), checked, base, ("m/s", "m/s", "rad/s")):
+            within(f"the base velocity {name}", value, (-joint.velocity, joint.velocity), unit)
+        return checked
+
+    def _checked_opening(self, opening_m: float) -> float:
+        within("the opening of the gripper", opening := float(opening_m), (0.0, self.description.max_opening_m), "m")
+        return opening
+
+    def _checked_force(self, force_n: float) -> float:
+        within("the force of a finger", force := float(force_n), (0.0, math.inf), "N")
+        return force
+
+
+def within(name: str, number: float, limits: tuple[float, float], unit: str) -> None:
+    """Raises `ValueError` if a target is beyond its limits: with the name, the unit, the limits, and the likely mistake."""
+    low, high = limits
+    if not math.isfinite(number):
+        raise ValueError(f"{name} is {number}, but must be finite")
+    if low - max(SLACK, SLACK_SHARE * abs(low)) <= number <= high + max(SLACK, SLACK_SHARE * abs(high)):
+        return
+    allowed = f"from {low:.4g} to {high:.4g} {unit}" if high < 1e300 else f"at least {low:.4g} {unit}"
+    others = {"m": (("cm", 0.01), ("mm", 0.001)), "rad": (("°", math.pi / 180.0),)}.get(unit, ())
+    meant = [f"{number:g} {other} are {number * factor:.4g} {unit}" for other, factor in others if low <= number * factor <= high]
+    remedy = f"; its unit is {unit}: {' and '.join(meant)}" if meant else ""
+    raise ValueError(f"{name} is {number:g} {unit}, but must be {allowed}{remedy}")

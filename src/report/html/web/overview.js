@@ -75,7 +75,7 @@ function brokenPairs({ runs, to, summary }) {
 function patternList(summary, most) {
   const list = (kind) => {
     const found = summary.findings.properties.flatMap((property) => property[kind].found.filter((pattern) => pattern.confirmed));
-    if (found.length) return make("ul", { class: "sentences" }, found.sort((a, b) => b.wracc - a.wracc).slice(0, most).map((pattern) => make("li", {}, pattern.sentence)));
+    if (found.length) return make("ul", { class: "sentences" }, found.sort((a, b) => b.wracc - a.wracc).slice(0, most).map((pattern) => make("li", { title: pattern.sentence }, pattern.plain)));
     const strongest = summary.findings.properties.flatMap((property) => property[kind].strongest.slice(0, 1)).sort((a, b) => a.p_corrected - b.p_corrected || a.p - b.p);
     if (!strongest.length) return make("p", {}, "Nothing differs between failures and passes.");
     return [make("p", { class: "faint" }, "None is beyond chance; the strongest:"), make("ul", { class: "sentences" }, strongest.slice(0, 3).map((one) => make("li", {}, one.sentence,

@@ -41,7 +41,7 @@ function patternCard({ runs, list, open }, property, of, pattern) {
     ["q", pattern.q < 1e-4 ? pattern.q.toExponential(0) : number(pattern.q)],
   ];
   return make("section", { class: "card pattern" },
-    make("h2", {}, pattern.sentence),
+    make("h2", {}, pattern.plain),
     make("dl", { class: "facts" }, facts.map(([name, value]) => make("div", {}, make("dt", {}, name), make("dd", {}, value)))),
     make("div", { class: "rates" },
       make("span", {}, "with it"), rateBar(pattern.rate, "failed"), make("span", {}, interval(pattern.rate)),

@@ -19,6 +19,8 @@ async function player(replay, slots, noted) {
   const measured = signalsOf(replay, course, forms, stage.target), thresholds = thresholdsOf(replay, course, measured, slots);
   const signals = decidingSignals(replay).concat(measured);
   const line = timeline(replay, course, signals, thresholds, (secs) => { set(false); seek(secs); });
+  const choice = chooser(quantitiesOf(replay, course, forms), signals, thresholds, seconds, line.choose);
+  const skill = skillPanel(replay, (to) => { set(false); seek(to); });
   let secs = 0, playing = false, last = 0, waiting = 0;
   const note = () => {
     clearTimeout(waiting);
@@ -32,6 +34,7 @@ async function player(replay, slots, noted) {
     clock.textContent = `${secs.toFixed(1)} / ${seconds.toFixed(1)} s`;
     stage.show(secs);
     line.mark(secs);
+    skill?.mark(secs);
     if (settled) note();
   };
   const set = (on) => {
@@ -66,7 +69,7 @@ async function player(replay, slots, noted) {
       stage.boxes.length > 0 && check("what it perceived", (on) => { stage.seen.visible = on; })),
     stage.pressed && make("p", { class: "pressed" }, `★ ${stage.pressed.told} `,
       make("button", { type: "button", class: "flat", onclick: () => { set(false); seek(stage.pressed.secs[0]); } }, "show the contact")),
-    line.element,
+    line.element, choice.element, skill?.element,
     make("div", { class: "pictures" }, pictures.map(([name, picture]) => make("figure", {},
       make("button", { type: "button", class: "flat", onclick: () => { set(false); seek(name === "before" ? 0 : seconds); } }, picture), make("figcaption", {}, name)))));
   const themed = () => { stage.theme(); snap(); };
@@ -76,7 +79,7 @@ async function player(replay, slots, noted) {
   document.addEventListener("theme", themed);
   return {
     element, seek: (to) => { set(false); seek(to); }, toggle: () => set(!playing),
-    begin: (at) => { line.draw(); stage.begin(at); seek(at); themed(); seek(at); },
+    begin: (at) => { choice.update(); stage.begin(at); seek(at); themed(); seek(at); },
     end: () => { set(false); clearTimeout(waiting); resized.disconnect(); line.end(); document.removeEventListener("theme", themed); stage.end(); },
   };
 }

@@ -34,19 +34,21 @@ const NARROWEST = 400;
 function timeline(replay, course, signals, thresholds, seek) {
   const seconds = course.seconds, element = scroller("Timeline and signals");
   element.classList.add("tracks");
-  let mark = () => {}, secs = 0, drawn = 0;
+  let mark = () => {}, secs = 0, drawn = 0, rows = signals, limits = thresholds;
   const draw = () => {
     const width = Math.max(NARROWEST, Math.round(element.clientWidth));
     if (!element.clientWidth || width === drawn) return;
     drawn = width;
-    const [drawing, follow] = timelineOf(replay, course, signals, thresholds, seconds, width, seek);
+    const [drawing, follow] = timelineOf(replay, course, rows, limits, seconds, width, seek);
     fill(element, drawing);
     mark = follow;
     mark(secs);
   };
   const resized = new ResizeObserver(() => requestAnimationFrame(draw));
   resized.observe(element);
-  return { element, draw, mark: (to) => { secs = to; mark(to); }, end: () => resized.disconnect() };
+  /** Draws other signals, with other limits. */
+  const choose = (signals, thresholds) => { [rows, limits, drawn] = [signals, thresholds, 0]; draw(); };
+  return { element, draw, choose, mark: (to) => { secs = to; mark(to); }, end: () => resized.disconnect() };
 }
 
 function timelineOf(replay, course, signals, thresholds, seconds, width, seek) {
