@@ -17,7 +17,7 @@ pub struct CampaignPictures(Env);
 /// Draws images of one run.
 pub struct RunPictures<'a> {
     stage: Stage,
-    camera: &'a Camera,
+    camera: Camera,
     eye: (Option<Place>, Isometry3<f64>),
     objects: Vec<Option<Place>>,
     links: Vec<Option<Place>>,
@@ -100,7 +100,7 @@ impl CampaignPictures {
         };
         RunPictures {
             stage,
-            camera: &env.campaign.sensing.camera,
+            camera: env.campaign.sensing.camera.clone(),
             eye,
             objects: objects.into_iter().map(|(_, place)| place).collect(),
             links,
@@ -118,6 +118,16 @@ impl RunPictures<'_> {
         drawn.unwrap_or_default()
     }
 
+    /// Lets the images be at most so wide, with the same field of view. Unit: pixels.
+    #[must_use]
+    pub fn at_most(mut self, width: u32) -> Self {
+        if self.camera.width > width {
+            self.camera.height = (self.camera.height * width / self.camera.width).max(1);
+            self.camera.width = width;
+        }
+        self
+    }
+
     /// Draws the image of a frame of the trace. `None` if there is no such frame, or the trace has
     /// no pose of the camera.
     pub fn frame(&self, frame: usize) -> Option<RunPicture> {
@@ -126,7 +136,7 @@ impl RunPictures<'_> {
         let eye = on?.at(row)? * pose;
         let at = |place: &Option<Place>| place.and_then(|place| place.at(row));
         let image = self.stage.draw(
-            self.camera,
+            &self.camera,
             &eye,
             self.objects.iter().map(at),
             self.links.iter().map(at),

@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 
 use crate::analyse::Analysed;
 use crate::appearance::AppearanceReader;
+use crate::camera_images::CameraImages;
 use crate::margin_bounds::margin_bounds;
 use crate::{clock, replayed_runs, work};
 use actcheck_base::Diagnostics;
@@ -37,7 +38,8 @@ pub(super) fn page(
         || PackedRuns::of(summary, table, sample.as_ref()),
         || {
             let looks = AppearanceReader::new(history, is_trusted);
-            replays(history, looks, ontology, &order, room)
+            let images = CameraImages::new(history, is_trusted);
+            replays(history, (looks, images), ontology, &order, room)
         },
     );
     let replays = replays?;
@@ -93,7 +95,7 @@ fn words(ontology: &Ontology) -> BTreeMap<String, PropertyWords> {
 /// Replays of as many runs as fit into `room` bytes.
 fn replays(
     history: &History,
-    mut looks: AppearanceReader,
+    (mut looks, mut images): (AppearanceReader, CameraImages),
     ontology: &Ontology,
     order: &[String],
     room: f64,
@@ -103,10 +105,13 @@ fn replays(
         return Ok(replays);
     }
     replayed_runs::for_each_batch(history, ontology, order, |batch| {
-        for (run, ..) in &batch {
+        for (run, trace, _) in &batch {
             let campaign = &run.row.campaign;
             if !replays.knows(campaign) {
                 replays.set_appearances(campaign, looks.of(campaign)?);
+            }
+            if let Some(trace) = trace {
+                replays.set_film(&run.row.run, images.film(run, trace)?);
             }
         }
         replays.add_all(&batch, room);

@@ -62,7 +62,11 @@ pub fn show(args: &ShowArgs) -> Result<(), Diagnostics> {
             let again = judged_again(&history.run(&run.row.run)?, &run);
             let campaign = history.campaign(&run.row.campaign)?;
             let notes = again + &made_by(&campaign) + &findings(&campaign);
-            run_text(&run, &perceived, page) + &trace.as_ref().map_or_else(String::new, |trace| skill_text(trace, page)) + &page.set(&notes)
+            run_text(&run, &perceived, page)
+                + &trace
+                    .as_ref()
+                    .map_or_else(String::new, |trace| skill_text(trace, page))
+                + &page.set(&notes)
         }
         Format::Json => {
             let mut json = run_json(&run, &perceived);

@@ -47,7 +47,7 @@ impl Answer {
     /// The record of the request and of this answer, whose binary data have `bytes`.
     pub fn record(&self, ask: &Ask, bytes: usize) -> AnsweredQuestion {
         let (count, objects) = match &self.content {
-            Content::Depth { width, height, .. } => (width * height, &[][..]),
+            Content::Depth(image) | Content::Rgb(image) => (image.width * image.height, &[][..]),
             Content::Cloud {
                 binary: [Binary { shape, .. }],
             } => (shape.first().copied().unwrap_or(0), &[][..]),

@@ -178,6 +178,7 @@ impl What {
     pub fn word(self) -> &'static str {
         match self {
             Self::Depth => "depth",
+            Self::Rgb => "rgb",
             Self::Cloud => "cloud",
             Self::Objects => "objects",
         }
