@@ -45,10 +45,11 @@ impl<'a> CameraImages<'a> {
         trace: &Trace,
         frames: &[usize],
     ) -> Result<Vec<DatasetImage>, Diagnostics> {
+        let history = self.history;
         let Some(pictures) = self.pictures(&run.row.campaign)? else {
             return Ok(Vec::new());
         };
-        let (choices, _) = self.history.traces().recorded(&run.row.run)?;
+        let (choices, _) = history.traces().recorded(&run.row.run)?;
         let drawn = pictures.run(run, trace, &choices).frames(frames);
         let image = |picture: RunPicture| DatasetImage {
             width: picture.image.width,
@@ -73,10 +74,11 @@ impl<'a> CameraImages<'a> {
         if times.is_empty() || self.n_drawn >= MOST_FILM_IMAGES {
             return Ok(Vec::new());
         }
+        let history = self.history;
         let Some(pictures) = self.pictures(&run.row.campaign)? else {
             return Ok(Vec::new());
         };
-        let (choices, _) = self.history.traces().recorded(&run.row.run)?;
+        let (choices, _) = history.traces().recorded(&run.row.run)?;
         let last = trace.frames.rows.len().saturating_sub(1);
         let frame = |secs: &f64| {
             #[expect(
