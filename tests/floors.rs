@@ -48,7 +48,7 @@ const FLOORS: [(&str, &[&str]); 22] = [
 ];
 
 /// Libraries of the field and the crates that may depend on them.
-const FENCES: [(&str, &[&str]); 34] = [
+const FENCES: [(&str, &[&str]); 35] = [
     ("toml", &["config"]),
     ("roxmltree", &["config"]),
     ("mesh-loader", &["config"]),
@@ -64,6 +64,7 @@ const FENCES: [(&str, &[&str]); 34] = [
         "parry3d",
         &["geometry", "robot", "world", "scenario", "episodes"],
     ),
+    ("png", &["geometry"]),
     ("mcap", &["episodes"]),
     ("prost", &["episodes"]),
     ("pyo3", &["judge"]),

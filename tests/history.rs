@@ -8,8 +8,9 @@ use std::time::Duration;
 
 use actcheck::base::{Diagnostics, Judgement, Outcome, RunFacts, Source, Term, digest_of, names};
 use actcheck::data::{
-    ActionEnd, Camera, Choice, ChoiceKind, CupState, Hand, LinkFrame, ObjectModel, Odometry,
-    Physics, Pose, Quality, RobotCore, RobotProfile, RobotStart, Role, Scene, SceneObject, Sensing,
+    ActionEnd, Camera, Choice, ChoiceKind, CupState, DecorRanges, Hand, LinkFrame, ObjectModel,
+    Odometry, Physics, Pose, Quality, RobotCore, RobotProfile, RobotStart, Role, Scene,
+    SceneObject, Sensing,
 };
 use actcheck::facts::extract;
 use actcheck::history::RunScene;
@@ -117,6 +118,7 @@ fn scene() -> Scene {
             gripper_noise_m: 0.001,
             odometry: Odometry::IDEAL,
             camera: Camera::IDEAL,
+            decor: DecorRanges::PLAIN,
         },
         physics: Physics {
             mass_scale: (1.0, 1.0),

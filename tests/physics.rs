@@ -7,8 +7,8 @@ use std::sync::Arc;
 use actcheck::actions::{ActionCall, perform};
 use actcheck::base::Files;
 use actcheck::data::{
-    ActionEnd, BodyState, Budget, Camera, Choices, ObjectModel, Odometry, Part, Physics, Pose,
-    RobotProfile, RobotStart, Role, Scene, SceneObject, Sensing, Shape, Trace,
+    ActionEnd, BodyState, Budget, Camera, Choices, DecorRanges, ObjectModel, Odometry, Part,
+    Physics, Pose, RobotProfile, RobotStart, Role, Scene, SceneObject, Sensing, Shape, Trace,
 };
 use actcheck::world::{GRAVITY, Poison, Shortcuts, World, build};
 
@@ -22,6 +22,7 @@ const PERFECT: Sensing = Sensing {
     gripper_noise_m: 0.0,
     odometry: Odometry::IDEAL,
     camera: Camera::IDEAL,
+    decor: DecorRanges::PLAIN,
 };
 
 fn robot() -> Arc<RobotProfile> {

@@ -162,6 +162,59 @@ fn the_side_of_a_program_is_kept_with_any_number_of_workers() {
     );
 }
 
+/// Ranges of light, for colour images.
+const LIGHT: &str = "
+[camera]
+width = 96
+height = 72
+image_noise = 0.01
+light_azimuth_rad = [0.0, 6.2]
+light_elevation_rad = [0.5, 1.4]
+light_brightness = [0.2, 0.9]
+ambient = [0.2, 0.5]
+table_textures = [\"plain\", \"checker\", \"wood\"]
+table_colours = [\"#b0865c\", \"#6c7a89\"]
+random_object_colours = true
+";
+
+/// A program's images of each scene, and the scene's objects and robot.
+fn images_of(folder: &Path, light: &str, jobs: &str) -> Vec<(String, [String; 2])> {
+    let config = folder.join("c.toml");
+    let text = std::fs::read_to_string(&config).unwrap();
+    let plain = text.split("\n[camera]").next().unwrap().to_owned();
+    std::fs::write(&config, plain + light).unwrap();
+    let history = format!("h{jobs}{}", light.len());
+    let (_, json, _) = run(folder, &["--jobs", jobs, "--history", &history]);
+    let image = |run: &Value| {
+        let id = of(run, "run");
+        let shown = actcheck(
+            folder,
+            &["show", id, "--history", &history, "--format", "json"],
+        );
+        let shown: Value = serde_json::from_str(&stdout(&shown)).unwrap();
+        let scene = [&shown["objects"], &shown["robot_base"]];
+        let message = shown["actions"][0]["message"].as_str().unwrap();
+        (message.to_owned(), scene.map(ToString::to_string))
+    };
+    runs(&json).iter().map(image).collect()
+}
+
+/// Images depend on the run only. Each scene has its own light, and is the same with and without
+/// ranges of light.
+#[test]
+fn colour_images_have_the_same_bits_with_any_number_of_workers() {
+    let folder = project("sees.py", "[[\"Pick\"]]", 4, "");
+    let folder = folder.path();
+    let lit = images_of(folder, LIGHT, "1");
+    assert_eq!(lit, images_of(folder, LIGHT, "2"));
+    let plain = images_of(folder, "\n[camera]\nwidth = 96\nheight = 72\n", "2");
+    for (idx, (with, without)) in lit.iter().zip(&plain).enumerate() {
+        assert_ne!(with.0, without.0, "run {idx}");
+        assert_eq!(with.1, without.1, "run {idx}");
+        assert!(lit.iter().filter(|(image, _)| *image == with.0).count() == 1);
+    }
+}
+
 #[test]
 fn a_program_gives_the_same_results_with_any_number_of_workers() {
     let folder = project(

@@ -72,6 +72,14 @@ max_range_m = 4.0
 range_noise_m = 0.01
 dropout = 0.01
 grazing_rad = 0.1
+image_noise = 0.01
+light_azimuth_rad = [0.0, 6.2]
+light_elevation_rad = [0.6, 1.5]
+light_brightness = [0.4, 0.9]
+ambient = [0.2, 0.5]
+table_textures = ["plain", "checker", "wood"]
+table_colours = ['#b0865c']
+random_object_colours = true
 
 [case]
 from = "abcd-1"

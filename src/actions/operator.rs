@@ -15,7 +15,7 @@ use actcheck_data::{
 };
 use actcheck_scenario::FloorPlan;
 use actcheck_world::{
-    Command, DepthImage, JointKind, Kinematics, Layout, Observation, Sighting, World,
+    Command, DepthImage, JointKind, Kinematics, Layout, Observation, RgbImage, Sighting, World,
 };
 
 /// Reason why a skill has to stop.
@@ -234,6 +234,12 @@ impl<'a> Operator<'a> {
     pub fn look_at_every(&mut self, stride: usize) -> DepthImage {
         self.last_look = Some(self.world.current_look());
         self.world.look_at_every(stride, self.choices)
+    }
+
+    /// Takes a colour picture with the camera.
+    pub fn picture(&mut self) -> RgbImage {
+        self.last_look = Some(self.world.current_look());
+        self.world.picture(self.choices)
     }
 
     /// Selects the sequence of postures that an arm planner samples: a number from 0 to 1, recorded

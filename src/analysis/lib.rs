@@ -42,7 +42,10 @@ pub use consistency::{
     Consistency, PassPower, Repeated, SceneCounts, SceneRuns, Variance, consistency,
 };
 pub use coverage::{Coverage, PairCoverage, ParameterCoverage};
-pub use dataset::{Dataset, DatasetRuns, export_dataset, export_facts};
+pub use dataset::{
+    Dataset, DatasetImage, DatasetRuns, DrawImages, LerobotDataset, export_dataset, export_facts,
+    export_lerobot,
+};
 pub use effects::{
     ActionEffects, FirstContact, LargestForce, PerceptionError, RealisedNoise, Surrounding,
     TableRun, perceived_sentences,

@@ -1,10 +1,14 @@
 //! The appearance of the bodies of a stored campaign, for pictures of its runs.
 
+use std::sync::Arc;
+
 use crate::environment::stored_campaign;
 use crate::solids;
 use actcheck_base::Diagnostics;
-use actcheck_data::{Appearances, SeenPart, Shape};
+use actcheck_config::Campaign;
+use actcheck_data::{Appearances, ObjectModel, SeenPart, Shape};
 use actcheck_history::History;
+use actcheck_world::{LazySkins, Robot, Skins};
 
 /// Most triangles of a body: more than a picture shows.
 const MOST_OF_A_BODY: usize = 2000;
@@ -60,6 +64,31 @@ pub fn appearances(
     }
     reduce(&mut all);
     Ok(all)
+}
+
+/// The surfaces of the bodies of a campaign, whose files are read when the first image is taken.
+/// Visual shapes that can't be read are those of collisions; [`appearances`] warns of them.
+pub(crate) fn skins(campaign: &Campaign, robot: &Robot) -> LazySkins {
+    let (visuals, robot) = (campaign.visuals.clone(), Arc::clone(&robot.model));
+    let used = campaign.used_models();
+    let models: Vec<Arc<ObjectModel>> = used
+        .iter()
+        .filter_map(|name| campaign.models.get(name).cloned())
+        .collect();
+    LazySkins::new(Box::new(move || {
+        let mut found = Diagnostics::new();
+        let seen = models.iter().filter_map(|model| {
+            let parts = visuals.model(&model.name, &mut found)?;
+            Some((model.name.clone(), parts))
+        });
+        let models_seen = seen.collect();
+        let all = Appearances {
+            links: robot.seen(&visuals.robot(&mut found)),
+            models: models_seen,
+            camera: None,
+        };
+        Skins::new(&all, models.iter().map(Arc::as_ref), &robot)
+    }))
 }
 
 /// Limits the triangles of each body and of all together.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::appearance::skins;
 use crate::budget::runs_per_test;
 use crate::case::check_case;
 use crate::relations::RelationRules;
@@ -22,7 +23,7 @@ use actcheck_protocol::{LineSink, Programs};
 use actcheck_rules::{Budget, RuleBook};
 use actcheck_scenario::Space;
 use actcheck_search::Strategy;
-use actcheck_world::{self as world, Robot};
+use actcheck_world::{self as world, LazySkins, Robot};
 
 /// A configuration with its ontology, scene space and rules, prepared once and shared by all
 /// workers.
@@ -50,6 +51,8 @@ pub struct Env {
     /// The program that performs actions instead of the reference skills, if the configuration
     /// names one.
     pub(super) programs: Option<Programs>,
+    /// The surfaces of its bodies, for colour images.
+    skins: Arc<LazySkins>,
 }
 
 impl Env {
@@ -226,6 +229,7 @@ impl Env {
                 }
                 let programs = programs(&campaign);
                 let text = campaign.source.text.to_string();
+                let skins = Arc::new(skins(&campaign, &robot));
                 faults.or(Self {
                     campaign,
                     ontology,
@@ -238,6 +242,7 @@ impl Env {
                     requirement,
                     relations,
                     programs,
+                    skins,
                 })
             }
             // A length in millimetres is the cause of most that do not fit.
@@ -246,6 +251,11 @@ impl Env {
                 Err(faults)
             }
         }
+    }
+
+    /// The surfaces of its bodies, for colour images.
+    pub fn skins(&self) -> &Arc<LazySkins> {
+        &self.skins
     }
 
     /// Warnings of the configuration, of the ontology and of the rules, such as rules without

@@ -27,6 +27,7 @@ pub mod mining;
 mod mjcf;
 pub mod oracles;
 mod outcome;
+mod pictures;
 mod plausible;
 mod playable;
 mod preconditions;
@@ -67,6 +68,7 @@ pub use import::{ImportEnd, ImportOptions, ImportedCampaign, import, name_of_imp
 pub use last_failed::LastFailed;
 pub use line::{Clock, Disturbance, RunContext, RunInput, run_line, run_sabotaged};
 pub use outcome::{CampaignResult, Ending, WeightedRate};
+pub use pictures::{CampaignPictures, RunPicture, RunPictures};
 pub use playable::{EngineLink, Playable, PlayableRun, PlayedAction, playable, played_in};
 pub use recheck::{RecheckEnd, RecheckOptions, judge_stored, recheck};
 pub use relations::{RelateOptions, relate};

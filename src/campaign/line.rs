@@ -9,7 +9,7 @@ use actcheck_actions as actions;
 use actcheck_actions::{ActionCall, ExternalSkill, Interference, Saboteur};
 use actcheck_base::{Judgement, RunFacts};
 use actcheck_config::Step;
-use actcheck_data::{ActionEnd, ChoiceName, Choices, Quality, Scene, Trace};
+use actcheck_data::{ActionEnd, ChoiceName, Choices, Decor, Quality, Scene, Trace};
 use actcheck_facts as facts;
 use actcheck_history::{RunRecord, RunStatus};
 use actcheck_protocol::{Performance, RunName};
@@ -312,6 +312,7 @@ fn perform(
     if let Some(deepest) = world.overlaps().first() {
         return Err(Failure::Overlap(deepest.to_string()));
     }
+    world.show(Arc::clone(env.skins()), Decor::of(choices.made()));
     let settling = world.settle();
     if !settling.left.is_empty() {
         return Err(Failure::Discard(format!(

@@ -4,13 +4,17 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use crate::camera_images::CameraImages;
 use crate::chosen::{self, ChosenRuns};
 use crate::trust::TrustArgs;
 use crate::{output, restore};
 use actcheck_analysis::{
-    Dataset, DatasetRuns, Mirror, export_csv, export_dataset, export_facts, export_parquet,
+    Dataset, DatasetRuns, DrawImages, LerobotDataset, Mirror, export_csv, export_dataset,
+    export_facts, export_lerobot, export_parquet,
 };
 use actcheck_base::Diagnostics;
+use actcheck_data::Trace;
+use actcheck_history::RunDetail;
 
 /// `actcheck export tables`
 #[derive(Debug, Args)]
@@ -36,6 +40,13 @@ pub struct ExportTablesArgs {
     /// bodies) and `phases`. The folder is then five to six times as large
     #[arg(long, conflicts_with_all = ["csv", "complete"])]
     pub course: bool,
+    /// Also the colour images of the camera, one a second: `images`
+    #[arg(long, conflicts_with_all = ["csv", "complete"])]
+    pub images: bool,
+    /// A LeRobotDataset (v3.0) instead: an episode for each run, ten frames a second, with the
+    /// joints, their commanded values, and the camera's images as PNG
+    #[arg(long, conflicts_with_all = ["csv", "complete", "dataset", "course", "images"])]
+    pub lerobot: bool,
     /// The runs in the tables, and their history.
     #[command(flatten)]
     pub chosen: ChosenRuns,
@@ -58,8 +69,17 @@ pub fn tables(args: &ExportTablesArgs) -> Result<(), Diagnostics> {
         hierarchy: &hierarchy,
     };
     let folder: &Path = &args.folder;
-    if args.dataset || args.course {
-        print_dataset(&export_dataset(&runs, folder, args.course)?);
+    let mut camera = CameraImages::new(&history, args.trust.trust);
+    let mut draw =
+        |run: &RunDetail, trace: &Trace, frames: &[usize]| camera.draw(run, trace, frames);
+    if args.lerobot {
+        print_lerobot(&export_lerobot(&runs, folder, &mut draw)?, folder);
+    } else if args.dataset || args.course || args.images {
+        let images: Option<&mut DrawImages<'_>> = match args.images {
+            true => Some(&mut draw),
+            false => None,
+        };
+        print_dataset(&export_dataset(&runs, folder, args.course, images)?);
     } else if args.complete {
         print_dataset(&export_facts(&runs, folder)?);
     } else {
@@ -74,6 +94,21 @@ pub fn tables(args: &ExportTablesArgs) -> Result<(), Diagnostics> {
         }
     }
     Ok(())
+}
+
+fn print_lerobot(written: &LerobotDataset, folder: &Path) {
+    output::print_prose(&format!(
+        "{} holds {} episodes with {} frames\n",
+        folder.display(),
+        written.episodes,
+        written.frames
+    ));
+    if written.left_out > 0 {
+        output::print_prose(&format!(
+            "{} runs are left out: their motion is not kept, their camera can't be drawn, or it has another size\n",
+            written.left_out
+        ));
+    }
 }
 
 fn print_dataset(dataset: &Dataset) {

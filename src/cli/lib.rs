@@ -11,6 +11,7 @@ mod args;
 mod audit;
 mod bisect;
 mod calibrate;
+mod camera_images;
 mod case;
 mod check;
 mod check_episodes;

@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 
 use crate::analyse::Analysed;
 use crate::appearance::AppearanceReader;
+use crate::camera_images::CameraImages;
 use crate::margin_bounds::margin_bounds;
 use crate::{clock, replayed_runs, work};
 use actcheck_base::Diagnostics;
@@ -52,7 +53,7 @@ pub(super) fn replay(
     let looks = AppearanceReader::new(history, false);
     let replays = replays(
         history,
-        looks,
+        (looks, CameraImages::new(history, false)),
         ontology,
         std::slice::from_ref(&id),
         f64::INFINITY,
@@ -87,7 +88,8 @@ fn rendered(
                 return Ok(Replays::default());
             };
             let looks = AppearanceReader::new(history, is_trusted);
-            replays(history, looks, ontology, &order, room)
+            let images = CameraImages::new(history, is_trusted);
+            replays(history, (looks, images), ontology, &order, room)
         },
     );
     let replays = replays?;
@@ -144,7 +146,7 @@ fn words(ontology: &Ontology) -> BTreeMap<String, PropertyWords> {
 /// Replays of as many runs as fit into `room` bytes.
 fn replays(
     history: &History,
-    mut looks: AppearanceReader,
+    (mut looks, mut images): (AppearanceReader, CameraImages),
     ontology: &Ontology,
     order: &[String],
     room: f64,
@@ -154,10 +156,13 @@ fn replays(
         return Ok(replays);
     }
     replayed_runs::for_each_batch(history, ontology, order, |batch| {
-        for (run, ..) in &batch {
+        for (run, trace, _) in &batch {
             let campaign = &run.row.campaign;
             if !replays.knows(campaign) {
                 replays.set_appearances(campaign, looks.of(campaign)?);
+            }
+            if let Some(trace) = trace {
+                replays.set_film(&run.row.run, images.film(run, trace)?);
             }
         }
         replays.add_all(&batch, room);

@@ -1,7 +1,9 @@
 //! Reads the tables of numbers: physics, sensing, camera and budget.
 
 use actcheck_base::Diagnostics;
-use actcheck_data::{Budget, CONTROL_HZ, Camera, Odometry, Physics, Sensing};
+use actcheck_data::{
+    Budget, CONTROL_HZ, Camera, Colour, DecorRanges, Odometry, Physics, Sensing, Texture,
+};
 use std::ops::Bound;
 
 use crate::{Limits, Table, duration_secs};
@@ -72,6 +74,7 @@ fn read_steps(table: &mut Table) -> Option<u32> {
 
 /// Reads `[sensing]`: standard deviations of the robot's sensing; 0, the default, is perfect.
 pub(crate) fn read_sensing(root: &mut Table, found: &mut Diagnostics) -> Sensing {
+    let (camera, decor) = read_camera(root, found);
     let mut sensing = Sensing {
         position_noise_m: 0.0,
         height_noise_m: 0.0,
@@ -81,7 +84,8 @@ pub(crate) fn read_sensing(root: &mut Table, found: &mut Diagnostics) -> Sensing
         heading_noise_rad: 0.0,
         gripper_noise_m: 0.0,
         odometry: Odometry::IDEAL,
-        camera: read_camera(root, found),
+        camera,
+        decor,
     };
     let Some(mut table) = root.table("sensing") else {
         return sensing;
@@ -118,11 +122,11 @@ pub(crate) fn read_sensing(root: &mut Table, found: &mut Diagnostics) -> Sensing
     sensing
 }
 
-/// Reads `[camera]`: the depth camera, without noise by default.
-fn read_camera(root: &mut Table, found: &mut Diagnostics) -> Camera {
+/// Reads `[camera]`: the camera, without noise by default, and the light and colours of images.
+fn read_camera(root: &mut Table, found: &mut Diagnostics) -> (Camera, DecorRanges) {
     let mut camera = Camera::IDEAL;
     let Some(mut table) = root.table("camera") else {
-        return camera;
+        return (camera, DecorRanges::PLAIN);
     };
     // No depth camera has more than a million pixels, and such an image takes seconds to render.
     for (key, value) in [("width", &mut camera.width), ("height", &mut camera.height)] {
@@ -172,8 +176,65 @@ fn read_camera(root: &mut Table, found: &mut Diagnostics) -> Camera {
         &mut camera.grazing_rad,
         table.number("grazing_rad", 0.0..=1.5),
     );
+    // With a fifth of full brightness as noise, nothing can be recognised.
+    set(
+        &mut camera.image_noise,
+        table.number("image_noise", 0.0..=0.2),
+    );
+    let decor = read_decor(&mut table);
     table.finish(found);
-    camera
+    (camera, decor)
+}
+
+/// Reads the light and colours of images.
+fn read_decor(table: &mut Table) -> DecorRanges {
+    DecorRanges {
+        // A whole turn to either side.
+        light_azimuth_rad: table.range("light_azimuth_rad", -6.3..=6.3),
+        // A light below the horizon shines through the floor.
+        light_elevation_rad: table.range("light_elevation_rad", 0.1..=1.6),
+        light_brightness: table.range("light_brightness", 0.0..=2.0),
+        ambient: table.range("ambient", 0.0..=2.0),
+        table_textures: read_words(
+            table,
+            "table_textures",
+            "patterns: `plain`, `checker` or `wood`",
+            Texture::from_word,
+        ),
+        table_colours: read_words(
+            table,
+            "table_colours",
+            "colours such as `#b0865c`",
+            Colour::from_hex,
+        ),
+        random_object_colours: table.boolean("random_object_colours").unwrap_or_default(),
+    }
+}
+
+/// Reads a list of words that each mean something.
+fn read_words<T>(
+    table: &mut Table,
+    key: &str,
+    expected: &str,
+    read: fn(&str) -> Option<T>,
+) -> Vec<T> {
+    let written = table.non_empty_strings(key).unwrap_or_default();
+    let mut values = Vec::new();
+    for word in written {
+        match read(&word.value) {
+            Some(value) => values.push(value),
+            None => table.fault(
+                "C004",
+                word.span,
+                format!(
+                    "`{key}` must be a list of {expected}, but this is `{}`",
+                    word.value
+                ),
+                format!("write {expected}"),
+            ),
+        }
+    }
+    values
 }
 
 /// Reads `[budget]`: limits on an action, on a run, and on the campaign.

@@ -60,6 +60,20 @@ pub enum ChoiceName {
         /// The designator.
         designator: String,
     },
+    /// Horizontal direction to the light of images.
+    LightAzimuth,
+    /// Height of the light of images above the horizon.
+    LightElevation,
+    /// Brightness of the light of images.
+    LightBrightness,
+    /// Brightness of the light from all around.
+    LightAmbient,
+    /// Pattern of the tables in images, a candidate.
+    TableTexture,
+    /// Colour of the tables in images, a candidate.
+    TableColour,
+    /// Seed of the colours of objects in images; 0 for those of their files.
+    ObjectColours,
     /// Seed of all randomness of a program that performs actions.
     SkillSeed,
     /// Seed of a motion planner's samples.
@@ -115,7 +129,7 @@ const LANDMARK: &str = "odometry.landmark";
 const ODOMETRY: &str = "odometry";
 
 /// Names without a variable part.
-const FIXED: [(ChoiceName, &str); 14] = [
+const FIXED: [(ChoiceName, &str); 21] = [
     (ChoiceName::World, "world"),
     (ChoiceName::SurfaceName, "surface.name"),
     (ChoiceName::SurfaceModel, "surface.model"),
@@ -126,6 +140,13 @@ const FIXED: [(ChoiceName, &str); 14] = [
     (ChoiceName::PlaceOtherCount, "place_other.count"),
     (ChoiceName::ActionsLeftOut, "test.left_out"),
     (ChoiceName::Renamed, "scene.renamed"),
+    (ChoiceName::LightAzimuth, "light.azimuth"),
+    (ChoiceName::LightElevation, "light.elevation"),
+    (ChoiceName::LightBrightness, "light.brightness"),
+    (ChoiceName::LightAmbient, "light.ambient"),
+    (ChoiceName::TableTexture, "table.texture"),
+    (ChoiceName::TableColour, "table.colour"),
+    (ChoiceName::ObjectColours, "objects.colours"),
     (ChoiceName::SkillSeed, "skill.seed"),
     (ChoiceName::MotionSamples, "motion.samples"),
     (ChoiceName::Gripper, "sense.gripper"),
@@ -190,6 +211,8 @@ impl ChoiceName {
             | Self::Gripper => "m",
             Self::Sighting { axis, .. } if *axis != SightingAxis::Yaw => "m",
             Self::Object(_, ObjectAxis::Yaw)
+            | Self::LightAzimuth
+            | Self::LightElevation
             | Self::Robot(StartAxis::Heading)
             | Self::Localisation(PlanarAxis::Heading)
             | Self::Landmark(PlanarAxis::Heading)
@@ -382,7 +405,7 @@ mod tests {
     use super::*;
 
     /// Names as histories and case files have them, in any version of the program.
-    const WRITTEN: [&str; 41] = [
+    const WRITTEN: [&str; 48] = [
         "world",
         "surface.name",
         "surface.model",
@@ -410,6 +433,13 @@ mod tests {
         "robot.y",
         "test.left_out",
         "step.3.pickObject",
+        "light.azimuth",
+        "light.elevation",
+        "light.brightness",
+        "light.ambient",
+        "table.texture",
+        "table.colour",
+        "objects.colours",
         "skill.seed",
         "motion.samples",
         "sense.localisation.x",

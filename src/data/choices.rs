@@ -67,6 +67,8 @@ pub struct Choices {
     /// Generator that takes over at [`Choices::begin_noise`]. If `None`, the scene's generator
     /// continues.
     noise: Option<Box<ChaCha8Rng>>,
+    /// Generator of [`Choices::apart`], once it was used.
+    aside: Option<Box<ChaCha8Rng>>,
     made: Vec<Choice>,
 }
 
@@ -170,6 +172,7 @@ impl Choices {
         Self {
             origin,
             noise: None,
+            aside: None,
             made: Vec::new(),
         }
     }
@@ -188,17 +191,45 @@ impl Choices {
         let Some(noise) = self.noise.take() else {
             return;
         };
+        if let Some(generator) = self.generator() {
+            *generator = noise;
+        }
+    }
+
+    /// Makes choices from a separate stream, so that those before and after are the same without
+    /// them.
+    pub fn apart<T>(&mut self, make: impl FnOnce(&mut Self) -> T) -> T {
+        let aside = self.aside.take();
+        let Some(generator) = self.generator() else {
+            return make(self);
+        };
+        let fresh = || {
+            let mut aside = generator.clone();
+            aside.set_stream(!generator.get_stream());
+            aside
+        };
+        let aside = aside.unwrap_or_else(fresh);
+        let own = std::mem::replace(generator, aside);
+        let made = make(self);
+        self.aside = self
+            .generator()
+            .map(|generator| std::mem::replace(generator, own));
+        made
+    }
+
+    /// The generator of random choices, if there are any.
+    fn generator(&mut self) -> Option<&mut Box<ChaCha8Rng>> {
         match &mut self.origin {
             Origin::Random(generator)
             | Origin::Steered { generator, .. }
             | Origin::Recorded {
                 rest: Rest::Random(generator),
                 ..
-            } => *generator = noise,
+            } => Some(generator),
             Origin::Recorded {
                 rest: Rest::Nominal,
                 ..
-            } => {}
+            } => None,
         }
     }
 

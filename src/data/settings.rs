@@ -1,5 +1,7 @@
 //! Settings of physics, sensors and budgets that a scene is simulated with.
 
+use crate::DecorRanges;
+
 /// A range to sample from, both ends included.
 pub type Range = (f64, f64);
 
@@ -42,8 +44,10 @@ pub struct Sensing {
     pub gripper_noise_m: f64,
     /// Localisation while the base drives.
     pub odometry: Odometry,
-    /// The depth camera (`[camera]`).
+    /// The camera (`[camera]`).
     pub camera: Camera,
+    /// The light and colours of scenes, for colour images (`[camera]`).
+    pub decor: DecorRanges,
 }
 
 /// Localisation while the base drives: keys of `[sensing]`. Standard deviations unless noted
@@ -74,7 +78,7 @@ impl Odometry {
     };
 }
 
-/// The depth camera on the robot's camera link: its intrinsics and noise.
+/// The camera on the robot's camera link, for depth and colour: its intrinsics and noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
     /// Image width. Unit: pixels.
@@ -96,6 +100,8 @@ pub struct Camera {
     /// Angle between ray and surface below which pixels are dropped: all at 0, none at this angle.
     /// Unit: radians.
     pub grazing_rad: f64,
+    /// Standard deviation of each channel of a colour image, as a share of full brightness.
+    pub image_noise: f64,
 }
 
 impl Camera {
@@ -110,7 +116,13 @@ impl Camera {
         range_noise_m: 0.0,
         dropout: 0.0,
         grazing_rad: 0.0,
+        image_noise: 0.0,
     };
+
+    /// Focal length. Unit: pixels.
+    pub fn focal_px(&self) -> f64 {
+        f64::from(self.width) / 2.0 / libm::tan(self.field_of_view_rad / 2.0)
+    }
 }
 
 /// Limits on one action. An action that exceeds them ends as `timeout`.

@@ -12,6 +12,7 @@ mod decompose;
 mod hull;
 mod neighbours;
 mod rays;
+mod render;
 mod separation;
 mod silhouette;
 mod solid_depth;
@@ -26,6 +27,7 @@ pub use decompose::{DecompositionFault, decompose, decomposition_key, sheet, sim
 pub use hull::Hull;
 pub use neighbours::{Corners, Neighbours, SURE_M};
 pub use rays::{Hit, Lens, RayScene};
+pub use render::{Drawn, Finish, Light, RgbImage, Skin, draw};
 pub use separation::{Separation, SeparationOutcome, SolidPair};
 pub use solid_depth::{Material, Piece, solid_depth_m};
 pub use solids::{BodySolids, Directions, Turned, gap, is_closer};

@@ -1,6 +1,7 @@
 //! Answers to a program's requests: pictures, points, and the objects of the reference perception.
 //! No simulated time passes.
 
+use nalgebra::Isometry3;
 use serde::Serialize;
 
 use crate::message::{Ask, Binary, What, WireObject, WirePose};
@@ -20,20 +21,21 @@ pub struct Answer {
 #[derive(Debug, Serialize)]
 #[serde(tag = "what", rename_all = "snake_case")]
 enum Content {
-    Depth {
-        camera_pose: WirePose,
-        width: usize,
-        height: usize,
-        horizontal_fov_rad: f64,
-        focal_px: f64,
-        binary: [Binary; 1],
-    },
-    Cloud {
-        binary: [Binary; 1],
-    },
-    Objects {
-        objects: Vec<WireObject>,
-    },
+    Depth(Image),
+    Rgb(Image),
+    Cloud { binary: [Binary; 1] },
+    Objects { objects: Vec<WireObject> },
+}
+
+/// An image of the camera. Its pose is by the robot's belief.
+#[derive(Debug, Serialize)]
+struct Image {
+    camera_pose: WirePose,
+    width: usize,
+    height: usize,
+    horizontal_fov_rad: f64,
+    focal_px: f64,
+    binary: [Binary; 1],
 }
 
 /// Number of objects of an answer that are recorded.
@@ -45,7 +47,7 @@ impl Answer {
     /// The record of the request and of this answer, whose binary data have `bytes`.
     pub fn record(&self, ask: &Ask, bytes: usize) -> AnsweredQuestion {
         let (count, objects) = match &self.content {
-            Content::Depth { width, height, .. } => (width * height, &[][..]),
+            Content::Depth(image) | Content::Rgb(image) => (image.width * image.height, &[][..]),
             Content::Cloud {
                 binary: [Binary { shape, .. }],
             } => (shape.first().copied().unwrap_or(0), &[][..]),
@@ -74,6 +76,7 @@ impl Answer {
 pub fn answer(ask: &Ask, robot: &mut Operator<'_>) -> (Answer, Option<Vec<u8>>) {
     let (content, bytes) = match ask.what {
         What::Depth => depth(robot),
+        What::Rgb => rgb(robot),
         What::Cloud => cloud(robot),
         What::Objects => (
             Content::Objects {
@@ -91,37 +94,49 @@ pub fn answer(ask: &Ask, robot: &mut Operator<'_>) -> (Answer, Option<Vec<u8>>) 
     )
 }
 
-/// A picture, and the camera's pose by the robot's belief.
-fn look(robot: &mut Operator<'_>) -> (DepthImage, nalgebra::Isometry3<f64>) {
+/// A depth image, and the camera's pose by the robot's belief.
+fn look(robot: &mut Operator<'_>) -> (DepthImage, Isometry3<f64>) {
     let image = robot.look();
     (image, robot.kinematics().camera(&robot.observe().positions))
 }
 
 fn depth(robot: &mut Operator<'_>) -> (Content, Option<Vec<u8>>) {
-    let (image, camera) = look(robot);
-    let DepthImage {
-        width,
-        height,
-        focal_px,
-        depths,
-    } = image;
-    let bytes = depths
+    let image = robot.look();
+    let bytes = image
+        .depths
         .iter()
         .flat_map(|depth| depth.to_le_bytes())
         .collect();
-    let content = Content::Depth {
-        camera_pose: WirePose::of(&Pose::from_isometry(&camera)),
-        width,
-        height,
-        horizontal_fov_rad: robot.camera().field_of_view_rad,
-        focal_px,
-        binary: [Binary {
-            name: "depth",
-            dtype: "f32",
-            shape: vec![height, width],
-        }],
+    let binary = Binary {
+        name: "depth",
+        dtype: "f32",
+        shape: vec![image.height, image.width],
     };
-    (content, Some(bytes))
+    (Content::Depth(described(binary, robot)), Some(bytes))
+}
+
+fn rgb(robot: &mut Operator<'_>) -> (Content, Option<Vec<u8>>) {
+    let image = robot.picture();
+    let binary = Binary {
+        name: "rgb",
+        dtype: "u8",
+        shape: vec![image.height, image.width, 3],
+    };
+    (Content::Rgb(described(binary, robot)), Some(image.bytes))
+}
+
+/// An image with the camera's intrinsics and pose.
+fn described(binary: Binary, robot: &Operator<'_>) -> Image {
+    let camera = robot.camera();
+    let pose = robot.kinematics().camera(&robot.observe().positions);
+    Image {
+        camera_pose: WirePose::of(&Pose::from_isometry(&pose)),
+        width: camera.width as usize,
+        height: camera.height as usize,
+        horizontal_fov_rad: camera.field_of_view_rad,
+        focal_px: camera.focal_px(),
+        binary: [binary],
+    }
 }
 
 fn cloud(robot: &mut Operator<'_>) -> (Content, Option<Vec<u8>>) {

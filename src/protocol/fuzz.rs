@@ -11,13 +11,14 @@ use crate::hello::{Joints, Role};
 use crate::message::{Ask, End, Hello, Plain, kind_of, parse};
 use crate::mutations::cases;
 
-const MESSAGES: [&str; 9] = [
+const MESSAGES: [&str; 10] = [
     r#"{"type": "hello", "protocol": 1, "name": "arm", "actions": ["Pick", "Place"]}"#,
     r#"{"type": "ready"}"#,
     r#"{"type": "command", "ticks": 12, "positions": {"a": 0.5, "b": -1e3}, "velocities": {}, "efforts": {"c": 2}}"#,
     r#"{"type": "command", "base_velocity": [0.1, 0.0, 0.2], "gripper": {"opening_m": 0.08, "force_n": 20}, "head": {"pan_rad": 0.1}}"#,
     r#"{"type": "ask", "what": "objects"}"#,
     r#"{"type": "ask", "what": "depth", "of": "glass_1"}"#,
+    r#"{"type": "ask", "what": "rgb"}"#,
     r#"{"type": "end", "succeeded": true, "message": "done"}"#,
     r#"{"type": "end", "succeeded": false, "perceived": [{"pose": {"position_m": [0, 0, 1], "quaternion_xyzw": [0, 0, 0, 1]},
         "size_m": [0.1, 0.1, 0.2], "category": "http://actions#Cup"}]}"#,

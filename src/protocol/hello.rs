@@ -8,7 +8,9 @@ use crate::message::PROTOCOL;
 use actcheck_world::{Joint, JointKind, World};
 
 /// Data that can be observed or requested.
-const SENSORS: [&str; 6] = ["joints", "odometry", "gripper", "depth", "cloud", "objects"];
+const SENSORS: [&str; 7] = [
+    "joints", "odometry", "gripper", "depth", "rgb", "cloud", "objects",
+];
 
 /// The first message to a program.
 #[derive(Debug, Serialize)]
@@ -20,7 +22,7 @@ pub struct Introduction<'a> {
     control_period_s: f64,
     privileged: bool,
     robot: Robot<'a>,
-    sensors: [&'static str; 6],
+    sensors: [&'static str; 7],
 }
 
 #[derive(Debug, Serialize)]

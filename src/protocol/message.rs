@@ -168,6 +168,7 @@ pub struct Ask {
 #[serde(rename_all = "snake_case")]
 pub enum What {
     Depth,
+    Rgb,
     Cloud,
     Objects,
 }
@@ -177,6 +178,7 @@ impl What {
     pub fn word(self) -> &'static str {
         match self {
             Self::Depth => "depth",
+            Self::Rgb => "rgb",
             Self::Cloud => "cloud",
             Self::Objects => "objects",
         }

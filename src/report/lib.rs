@@ -23,8 +23,8 @@ pub use formats::{
     allure_results, markdown, observation,
 };
 pub use html::{
-    Explained, HTML_COLUMNS, HtmlReport, MarginBound, PackedRuns, PropertyWords, ReplayedRun,
-    Replays, html, html_data, replay_order,
+    Explained, FilmImage, HTML_COLUMNS, HtmlReport, MarginBound, PackedRuns, PropertyWords,
+    ReplayedRun, Replays, film_times, html, html_data, replay_order,
 };
 pub use json::{
     campaign_json, case_json, compare_json, engines_json, findings_json, health_json, labels_json,

@@ -116,6 +116,7 @@ pub fn draw(space: &Space, test: usize, choices: &mut Choices) -> Result<Scene, 
         .collect();
     builder.objects.extend(parts);
     let steps = builder.set_steps(test)?;
+    space.sensing.decor.choose(builder.choices);
     let root_height_m = builder.ground_m + space.robot.core.mount_height_m;
     let name = builder
         .designators

@@ -18,10 +18,10 @@ use actcheck_geometry::{from_pose, to_real, to_vector};
 
 /// Distance from the lens within which the camera does not see its own link: housings surround
 /// their lens, and their convex hulls close its opening. Unit: metres.
-const HOUSING_M: f64 = 0.1;
+pub(super) const HOUSING_M: f64 = 0.1;
 
 /// Number of noise seeds, including 0 (no noise).
-const FRAMES: usize = 1 << 32;
+pub(super) const FRAMES: usize = 1 << 32;
 
 /// A depth image. Frame of its points: the camera's, x forwards, y left, z up.
 #[derive(Debug, Clone, PartialEq)]
@@ -117,12 +117,12 @@ fn shown_at(drive: &Drive, collider: &Collider) -> Isometry3<f64> {
     }
 }
 
-fn lens(camera: &Camera) -> Lens {
+pub(super) fn lens(camera: &Camera) -> Lens {
     let (width, height) = (camera.width as usize, camera.height as usize);
     Lens {
         width,
         height,
-        focal_px: f64::from(camera.width) / 2.0 / libm::tan(camera.field_of_view_rad / 2.0),
+        focal_px: camera.focal_px(),
     }
 }
 

@@ -40,6 +40,7 @@ mod ownership;
 mod patches;
 mod perturbation;
 mod physics;
+mod picture;
 mod playback;
 mod proximity;
 mod quality;
@@ -64,6 +65,7 @@ pub use fault::{Fault, Perturbation, Poison};
 pub use fresh::narrow_phase;
 pub use other_engine::{EngineContact, EngineState, MovedObject, OtherEngine};
 pub use overlaps::Overlap;
+pub use picture::{LazySkins, Skins, Stage, StagedObject};
 pub use playback::{MotorGains, Playback, PlayedObject, PrincipalInertia, Setpoint, Surfaces};
 pub use proximity::Proximity;
 pub use reach::Shortcuts;
@@ -74,12 +76,12 @@ pub use simulation::{World, build, build_with, keep_playback, move_by};
 pub use suction::would_seal;
 
 pub use actcheck_geometry::{
-    Cluster, DecompositionFault, Sphere, decompose, decomposition_key, has_volume, sheet,
+    Cluster, DecompositionFault, RgbImage, Sphere, decompose, decomposition_key, has_volume, sheet,
     simplified, sphere_tree,
 };
 pub use actcheck_robot::{
     BalancedJoint, Completed, Dynamics, FingerJoint, GRAVITY, Gripper, GripperFault, Joint,
-    JointKind, Kinematics, Layout, Proposal, Robot, RobotBody, RobotError, RobotMeasures,
+    JointKind, Kinematics, Layout, Mount, Proposal, Robot, RobotBody, RobotError, RobotMeasures,
     RobotModel, SelfContact, UNKNOWN_EFFORT, UNKNOWN_SPEEDS, UnknownHand, complete, geometry, ik,
     propose,
 };

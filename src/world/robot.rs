@@ -442,7 +442,7 @@ pub(super) mod tests {
     use crate::simulation::tests::{bodies, bodies_mut, tick};
     use crate::{World, build, ik};
     use actcheck_base::Files;
-    use actcheck_data::{Camera, Choices, Odometry, Physics, Scene, Sensing};
+    use actcheck_data::{Camera, Choices, DecorRanges, Odometry, Physics, Scene, Sensing};
     use actcheck_geometry::from_pose;
 
     pub(crate) fn lonely() -> World {
@@ -481,6 +481,7 @@ pub(super) mod tests {
                 gripper_noise_m: 0.0,
                 odometry: Odometry::IDEAL,
                 camera: Camera::IDEAL,
+                decor: DecorRanges::PLAIN,
             },
             physics: Physics {
                 mass_scale: one,

@@ -10,7 +10,7 @@
 //! No part knows the world, and the parts know each other only in this order: proximity, engine,
 //! drive, recorder.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use crate::camera::{self, DepthImage};
 use crate::drive::{Command, Drive, Observation};
@@ -20,13 +20,15 @@ use crate::observe::snapshot;
 use crate::other_engine::OtherEngine;
 use crate::overlaps::{Overlap, overlaps};
 use crate::perturbation;
+use crate::picture::{self, LazySkins, Skins, Stage};
 use crate::proximity::Proximity;
 use crate::reach::Shortcuts;
 use crate::recorder::{Record, Recorder};
 use crate::sense::{self, Sighting};
 use crate::settle::{MOST_SECS, REST_SECS, Settling, moving};
 use crate::{Fault, Kinematics, Layout, Perturbation, Poison, WorldError};
-use actcheck_data::{Choices, KnownKind, Look, Part, RobotProfile, Scene, Snapshot};
+use actcheck_data::{Choices, Decor, KnownKind, Look, Part, RobotProfile, Scene, Snapshot};
+use actcheck_geometry::RgbImage;
 use actcheck_robot::Robot;
 
 /// A simulation of one scene. Each worker has its own.
@@ -35,6 +37,16 @@ pub struct World {
     drive: Drive,
     proximity: Proximity,
     recorder: Recorder,
+    shown: Shown,
+}
+
+/// What colour images show, for which the simulation has no use.
+#[derive(Default)]
+struct Shown {
+    skins: Option<Arc<LazySkins>>,
+    decor: Option<Decor>,
+    /// The bodies, once an image was taken.
+    stage: OnceLock<Stage>,
 }
 
 /// Builds the simulation of a scene, before any step: see [`World::settle`].
@@ -64,6 +76,7 @@ pub fn build_with(scene: &Scene, robot: &Robot) -> Result<World, WorldError> {
         engine,
         drive: Drive::of(scene),
         proximity: Proximity::with(shortcuts),
+        shown: Shown::default(),
     })
 }
 
@@ -218,6 +231,33 @@ impl World {
         let watch = self.engine.watch();
         let began_secs = watch.now_secs();
         let image = camera::look(self.engine.bodies(), &self.drive, stride, choices);
+        watch.looked(began_secs);
+        image
+    }
+
+    /// Sets the surfaces of the bodies, the light and the colours of images. Without them, images
+    /// show the collision shapes.
+    pub fn show(&mut self, skins: Arc<LazySkins>, decor: Decor) {
+        self.shown = Shown {
+            skins: Some(skins),
+            decor: Some(decor),
+            stage: OnceLock::new(),
+        };
+    }
+
+    /// Takes a colour image from the camera's current true pose.
+    pub fn picture(&self, choices: &mut Choices) -> RgbImage {
+        let watch = self.engine.watch();
+        let began_secs = watch.now_secs();
+        let bodies = self.engine.bodies();
+        let stage = self.shown.stage.get_or_init(|| {
+            let decor = self.shown.decor.unwrap_or(Decor::PLAIN);
+            match &self.shown.skins {
+                Some(skins) => picture::stage(bodies, skins, &decor),
+                None => picture::stage(bodies, &Skins::default(), &decor),
+            }
+        });
+        let image = picture::picture(bodies, &self.drive, stage, choices);
         watch.looked(began_secs);
         image
     }

@@ -14,6 +14,8 @@ def perform(link, begin):
     depth = link.ask({"type": "ask", "what": "depth"})
     camera = robot["camera"]
     assert (depth["width"], depth["height"]) == (camera["width"], camera["height"])
+    rgb = link.ask({"type": "ask", "what": "rgb"})
+    assert rgb["binary"][0]["shape"] == [camera["height"], camera["width"], 3]
     cloud = link.ask({"type": "ask", "what": "cloud"})
     assert cloud["binary"][0]["shape"][1] == 3
     seen = link.ask({"type": "ask", "what": "objects", "of": target})

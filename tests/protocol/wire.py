@@ -6,7 +6,7 @@ import socket
 import struct
 import sys
 
-LIMITS = {"f32": 4}
+LIMITS = {"f32": 4, "u8": 1}
 
 
 class Link:

@@ -14,7 +14,10 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 sys.path.insert(0, str(EXAMPLES))
 
 from grasp_offset import FEATURES, Network, corrected, features
+from image_place import CELL, WINDOWS, PlaceNetwork, cells
 from train_grasp_offset import learn
+from train_image_place import CHANNELS, backward, wanted
+from train_image_place import learn as learn_place
 
 WEIGHTS = EXAMPLES / "grasp_offset.json"
 
@@ -49,6 +52,44 @@ class GraspOffset(unittest.TestCase):
         error = np.linalg.norm(network(inputs[100:]) - offsets[100:], axis=1)
         self.assertLess(np.median(error), 0.004)
         np.testing.assert_array_equal(learn(inputs[:100], offsets[:100], seed=1).hidden, network.hidden)
+
+
+class ImagePlace(unittest.TestCase):
+    def test_the_slopes_are_those_of_the_loss(self) -> None:
+        generator = np.random.default_rng(3)
+        sizes = zip(WINDOWS, CHANNELS[:-1], CHANNELS[1:], strict=True)
+        weights = [generator.normal(0.0, 0.2, (side * side * inner, outer)) for side, inner, outer in sizes]
+        network = PlaceNetwork(weights, [generator.normal(0.0, 0.1, outer) for outer in CHANNELS[1:]])
+        views = generator.normal(0.0, 1.0, (2, 9, 9, 3))
+        target = wanted(np.array([(12.0, 20.0), (30.0, 8.0)]), (9, 9)).astype(np.float64)
+
+        def loss() -> float:
+            scores = network.scores(views)[0]
+            most = scores.max(axis=(1, 2), keepdims=True)
+            logs = scores - most - np.log(np.exp(scores - most).sum(axis=(1, 2), keepdims=True))
+            return -float((target * logs).sum()) / len(views)
+
+        for values, slopes in zip(network.weights + network.biases[:2], backward(network, views, target), strict=False):
+            place = tuple(int(generator.integers(0, size)) for size in values.shape)
+            values[place] += 1e-5
+            above = loss()
+            values[place] -= 2e-5
+            self.assertAlmostEqual((above - loss()) / 2e-5, float(slopes[place]), delta=1e-5)
+            values[place] += 1e-5
+
+    def test_a_block_of_any_colour_is_found_and_training_is_the_same_again(self) -> None:
+        generator = np.random.default_rng(5)
+        pictures = np.empty((48, 64, 64, 3), np.uint8)
+        pictures[:] = generator.integers(60, 200, (48, 1, 1, 3))
+        places = generator.integers((12, 24), (52, 60), (48, 2)).astype(np.float32)
+        for picture, (column, row) in zip(pictures, places.astype(int), strict=True):
+            picture[row - 20 : row, column - 6 : column + 6] = generator.integers(0, 255, 3)
+        network = learn_place(pictures[:40], places[:40], seed=1, epochs=25)
+        off = [np.hypot(*(np.array(network(one)) - place)) for one, place in zip(pictures[40:], places[40:], strict=True)]
+        self.assertLess(float(np.median(off)), CELL)
+        again = learn_place(pictures[:8], places[:8], seed=1, epochs=1)
+        np.testing.assert_array_equal(again.weights[0], learn_place(pictures[:8], places[:8], seed=1, epochs=1).weights[0])
+        self.assertEqual(cells(pictures).shape, (48, 16, 16, 3))
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from actcheck import Held, Plane, Pose, Report, Thing
-from actcheck.messages import DepthImage, Observation, RobotDescription, things_from_wire
+from actcheck.messages import DepthImage, Observation, RgbImage, RobotDescription, things_from_wire
 from actcheck.session import Session
 from actcheck.wire import Message
 
@@ -156,6 +156,12 @@ class FromTheSimulation(unittest.TestCase):
         self.assertEqual((image.width, image.height), (picture.pop("width"), picture.pop("height")))
         picture.pop("arrays")
         self.assertEqual(missing(picture, image), [])
+        colour = samples.of(message_schema("ToProgram", "answer", "rgb"))
+        colour["arrays"] = {"rgb": np.zeros((colour["height"], colour["width"], 3), np.uint8)}
+        seen_colour = RgbImage.from_wire(colour)
+        self.assertEqual((seen_colour.width, seen_colour.height), (colour.pop("width"), colour.pop("height")))
+        colour.pop("arrays")
+        self.assertEqual(missing(colour, seen_colour), [])
 
     def test_a_field_that_the_client_lacks_is_noticed(self) -> None:
         sent = Samples().of(message_schema("ToProgram", "observation"))

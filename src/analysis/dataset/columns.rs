@@ -116,6 +116,36 @@ pub(super) const CAMERA_QY: ColumnSpec = number("camera_qy", "1", "true rotation
 pub(super) const CAMERA_QZ: ColumnSpec = number("camera_qz", "1", "true rotation of the camera");
 pub(super) const CAMERA_QW: ColumnSpec = number("camera_qw", "1", "true rotation of the camera");
 
+/// The camera's colour images.
+pub(super) const IMAGES: TableSpec = TableSpec {
+    file: "images.parquet",
+    rows: "an image of the camera at a time of an action",
+    columns: &[
+        RUN,
+        STEP,
+        number(
+            "time_s",
+            "s",
+            "time since the action began; one row a second, the first at its start",
+        ),
+        count("width", "unit: pixels"),
+        count("height", "unit: pixels"),
+        CAMERA_X,
+        CAMERA_Y,
+        CAMERA_Z,
+        CAMERA_QX,
+        CAMERA_QY,
+        CAMERA_QZ,
+        CAMERA_QW,
+        ColumnSpec {
+            name: "png",
+            kind: ColumnKind::Image,
+            unit: "",
+            description: "the image without noise of the sensor, as a PNG file",
+        },
+    ],
+};
+
 /// Actions with their results.
 pub(super) const ACTIONS: TableSpec = TableSpec {
     file: "actions.parquet",

@@ -4,13 +4,14 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use crate::dataset::columns::{ACTIONS, JOINTS, OBJECTS, PERCEPTS, ROBOT, TableSpec};
+use crate::dataset::columns::{ACTIONS, IMAGES, JOINTS, OBJECTS, PERCEPTS, ROBOT, TableSpec};
 use crate::dataset::fact_columns::{
     BODIES, CONTACTS, EXTREMES, INTERVALS, JOINT_EXTREMES, LINKS, PLACES, PLANES, SELF_CONTACTS,
     SHAPES, STATES,
 };
+use crate::dataset::images::DrawImages;
 use crate::dataset::sheets::Sheets;
-use crate::dataset::{course, fact_source, source};
+use crate::dataset::{course, fact_source, images, source};
 use crate::tables::{new_text, outcomes_schema, pending_parquet, unwritten};
 use crate::{Hierarchy, Mirror, TableFilter};
 use actcheck_base::{Below, Diagnostics};
@@ -64,6 +65,7 @@ pub struct DatasetRuns<'a> {
 
 /// Writes observations, commands, percepts, ground truth and outcomes of runs into a folder,
 /// creating it if needed. `with_course`: also the course of each action at the control rate.
+/// `images`: also the camera's colour images, which it draws.
 ///
 /// # Errors
 /// `A001` if it can't be written; errors of reading the history or a trace.
@@ -71,9 +73,16 @@ pub fn export_dataset(
     runs: &DatasetRuns<'_>,
     folder: &Path,
     with_course: bool,
+    mut images: Option<&mut DrawImages<'_>>,
 ) -> Result<Dataset, Diagnostics> {
     let further = course::COURSE.into_iter().filter(|_| with_course);
-    let tables: Vec<&TableSpec> = FACTS.into_iter().chain(COURSES).chain(further).collect();
+    let of_images = images.iter().map(|_| &IMAGES);
+    let tables: Vec<&TableSpec> = FACTS
+        .into_iter()
+        .chain(COURSES)
+        .chain(further)
+        .chain(of_images)
+        .collect();
     export(runs, &tables, folder, |run, sheets| {
         let Some(trace) = runs.history.traces().whole_if_allowed(&run.row.run)? else {
             return add_facts(runs, run, sheets).map(|()| Motion::Withheld);
@@ -83,6 +92,9 @@ pub fn export_dataset(
         source::add_courses(&run.row.run, &trace, sheets);
         if with_course {
             course::add(&run.row.run, &trace, sheets);
+        }
+        if let Some(draw) = &mut images {
+            images::add(run, &trace, *draw, sheets)?;
         }
         Ok(Motion::Written)
     })

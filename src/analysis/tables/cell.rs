@@ -7,6 +7,7 @@ pub(crate) enum Cell {
     Number(Option<f64>),
     Count(Option<i64>),
     Bool(Option<bool>),
+    Bytes(Option<Vec<u8>>),
 }
 
 impl Cell {

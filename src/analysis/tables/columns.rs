@@ -26,6 +26,9 @@ pub enum ColumnKind {
     /// True or false.
     #[serde(rename = "truth")]
     Bool,
+    /// An image as a PNG file.
+    #[serde(rename = "png")]
+    Image,
 }
 
 /// The meaning of a column's values for a run.

@@ -118,6 +118,18 @@ pub(crate) fn series(name: &str, kind: ColumnKind, cells: Vec<Cell>) -> Series {
             };
             Values::new(name, cells.map(bool).collect::<Vec<Option<bool>>>())
         }
+        ColumnKind::Image => {
+            let bytes = |cell| {
+                if let Cell::Bytes(bytes) = cell {
+                    bytes
+                } else {
+                    None
+                }
+            };
+            let files: Vec<Option<Vec<u8>>> = cells.map(bytes).collect();
+            let files: Vec<Option<&[u8]>> = files.iter().map(Option::as_deref).collect();
+            Values::new(name, files)
+        }
     }
     .into()
 }

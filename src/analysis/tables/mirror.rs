@@ -631,6 +631,7 @@ fn kind(kind: ColumnKind) -> &'static str {
         ColumnKind::Number => "Number",
         ColumnKind::Count => "Count",
         ColumnKind::Bool => "Truth",
+        ColumnKind::Image => "Binary",
     }
 }
 

@@ -10,6 +10,7 @@
 
 mod columns;
 mod events;
+mod film;
 mod input;
 mod joints;
 mod order;
@@ -22,6 +23,7 @@ mod signals;
 mod summary;
 
 pub use columns::{HTML_COLUMNS, PackedRuns};
+pub use film::{FilmImage, film_times};
 pub use input::{Explained, HtmlReport, MarginBound, PropertyWords};
 pub use order::replay_order;
 pub use page::{html, html_data};

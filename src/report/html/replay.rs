@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 
 use crate::html::Explained;
 use crate::html::events::action;
+use crate::html::film::{FilmImage, packed_film};
 use crate::html::joints::joints;
 use crate::html::pack::{Pack, packed};
 use crate::html::shapes::Shapes;
@@ -37,6 +38,8 @@ pub struct Replays {
     shapes: Shapes,
     /// The appearance of the bodies of campaigns, by the campaign's id.
     appearances: BTreeMap<String, Arc<Appearances>>,
+    /// The images of runs that are not added yet, by the run's id.
+    films: BTreeMap<String, Vec<FilmImage>>,
     runs: BTreeMap<String, String>,
     bytes: usize,
 }
@@ -52,9 +55,15 @@ impl Replays {
         self.appearances.insert(campaign.to_owned(), appearances);
     }
 
+    /// Sets the images that a run's program asked for, before the run is added.
+    pub fn set_film(&mut self, run: &str, film: Vec<FilmImage>) {
+        self.films.insert(run.to_owned(), film);
+    }
+
     /// Adds a run. A run without a trace can't be played back, but its details are included.
     pub fn add(&mut self, run: &RunDetail, trace: Option<&Trace>, explained: &[Explained]) {
-        let packed = self.bodies(place(run), trace).packed(run, trace, explained);
+        let bodies = self.filmed_bodies(run, trace);
+        let packed = bodies.packed(run, trace, explained);
         self.insert(run, packed);
     }
 
@@ -68,7 +77,7 @@ impl Replays {
             Vec::with_capacity(runs.len()),
         );
         for run in runs {
-            numbered.push((run, self.bodies(place(&run.0), run.1.as_ref())));
+            numbered.push((run, self.filmed_bodies(&run.0, run.1.as_ref())));
             shapes.push(self.shapes.all().len());
         }
         let of_a_worker = runs
@@ -93,6 +102,13 @@ impl Replays {
                 self.shapes.truncate(shapes);
                 return;
             }
+        }
+    }
+
+    fn filmed_bodies(&mut self, run: &RunDetail, trace: Option<&Trace>) -> Bodies {
+        Bodies {
+            film: self.films.remove(&run.row.run).unwrap_or_default(),
+            ..self.bodies(place(run), trace)
         }
     }
 
@@ -215,6 +231,7 @@ impl Replays {
             tracks,
             slots,
             camera: appearances.camera.as_ref().map_or(Value::Null, camera),
+            film: Vec::new(),
         }
     }
 }
@@ -260,6 +277,7 @@ struct Bodies {
     slots: Vec<usize>,
     /// Place of the robot's camera, or `null`.
     camera: Value,
+    film: Vec<FilmImage>,
 }
 
 fn packed_runs(runs: &[(&ReplayedRun, Bodies)]) -> Vec<String> {
@@ -289,6 +307,9 @@ impl Bodies {
             pack.set("joints", joints);
             pack.set("skill", skill_json(trace));
             pack.set("camera", self.camera.clone());
+            if !self.film.is_empty() {
+                pack.set("film", packed_film(&self.film));
+            }
         }
         pack.finish()
     }

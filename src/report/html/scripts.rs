@@ -2,16 +2,17 @@
 
 /// Style sheets: colours of both themes, the page, outcomes and plots, the list and the run view,
 /// the side of a program.
-pub(super) const STYLE: [&str; 5] = [
+pub(super) const STYLE: [&str; 6] = [
     include_str!("web/colours.css"),
     include_str!("web/page.css"),
     include_str!("web/parts.css"),
     include_str!("web/runs.css"),
     include_str!("web/skill.css"),
+    include_str!("web/film.css"),
 ];
 
 /// Scripts. All share one scope; the last one starts the program.
-pub(super) const SCRIPT: [&str; 38] = [
+pub(super) const SCRIPT: [&str; 39] = [
     include_str!("web/dom.js"),
     include_str!("web/sorted.js"),
     include_str!("web/unpack.js"),
@@ -44,6 +45,7 @@ pub(super) const SCRIPT: [&str; 38] = [
     include_str!("web/signals.js"),
     include_str!("web/quantities.js"),
     include_str!("web/chooser.js"),
+    include_str!("web/film.js"),
     include_str!("web/skill.js"),
     include_str!("web/timeline.js"),
     include_str!("web/player.js"),

@@ -34,6 +34,7 @@ from actcheck.messages import (
     Observation,
     Plane,
     Report,
+    RgbImage,
     RobotDescription,
     Thing,
 )
@@ -70,6 +71,7 @@ __all__ = [
     "RecordingFault",
     "Report",
     "Result",
+    "RgbImage",
     "Robot",
     "RobotDescription",
     "Thing",

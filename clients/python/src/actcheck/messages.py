@@ -272,6 +272,38 @@ class DepthImage:
 
 
 @dataclass(frozen=True, eq=False)
+class RgbImage:
+    """A colour picture of the camera."""
+
+    #: Red, green and blue in sRGB. Shape: height × width × 3.
+    rgb: NDArray[np.uint8]
+    #: As of :class:`DepthImage`, whose pixels see the same points.
+    camera_pose: Pose
+    horizontal_fov_rad: float
+    focal_px: float
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return int(self.rgb.shape[1])
+
+    @property
+    def height(self) -> int:
+        """Number of rows."""
+        return int(self.rgb.shape[0])
+
+    @classmethod
+    def from_wire(cls, sent: Message) -> RgbImage:
+        """Converts an answer message with its array."""
+        return cls(
+            rgb=sent["arrays"]["rgb"],
+            camera_pose=Pose.from_wire(sent["camera_pose"]),
+            horizontal_fov_rad=float(sent["horizontal_fov_rad"]),
+            focal_px=float(sent["focal_px"]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class Report:
     """An action's own report at its end."""
 

@@ -19,6 +19,7 @@ from actcheck.messages import (
     Observation,
     Plane,
     Report,
+    RgbImage,
     RobotDescription,
     Thing,
     things_from_wire,
@@ -226,6 +227,10 @@ class Robot:
     def depth(self) -> DepthImage:
         """A picture of the depth camera."""
         return DepthImage.from_wire(self._session.ask("depth"))
+
+    def image(self) -> RgbImage:
+        """A colour picture of the same camera."""
+        return RgbImage.from_wire(self._session.ask("rgb"))
 
     def cloud(self) -> NDArray[np.float32]:
         """The points that the depth camera sees. Shape: points × 3. Frame: world. Unit: metres."""

@@ -29,7 +29,7 @@ function skillPanel(replay, seek) {
     make("h2", {}, "The program's side"),
     make("div", { class: "skillhead" }, make("span", { class: "faint" }, `${counted(printed, "line")} printed, ${counted(commands, "command")}, ${counted(asked, "question")}`),
       make("label", { class: "check" }, only, " only its output")),
-    list, left.length > 0 && make("p", { class: "faint" }, `Not kept, in the middle: ${left.join(", ")}`));
+    filmStrip(replay, seek), list, left.length > 0 && make("p", { class: "faint" }, `Not kept, in the middle: ${left.join(", ")}`));
   return { element, mark };
 }
 
