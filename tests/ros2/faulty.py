@@ -2,6 +2,7 @@
 
 import ctypes
 import os
+import random
 import signal
 import subprocess
 import sys
@@ -11,7 +12,7 @@ import tomllib
 from pathlib import Path
 
 FAULTS = tomllib.loads((Path(__file__).parent / "faults.toml").read_text())["fault"]
-FAULT = FAULTS[int(os.environ["ACTCHECK_INDEX"])]["name"]
+FAULT = os.environ.get("FAULT") or FAULTS[int(os.environ["ACTCHECK_INDEX"])]["name"]
 
 if FAULT == "exits at its start":
     sys.exit("no configuration")
@@ -54,6 +55,9 @@ class Faulty(Node):
         self.arm = ActionClient(self, FollowJointTrajectory, "arm_controller/follow_joint_trajectory", callback_group=group)
         self.gripper = ActionClient(self, GripperCommand, "gripper_controller/gripper_cmd", callback_group=group)
         self.base = ActionClient(self, NavigateToPose, "navigate_to_pose", callback_group=group)
+        if FAULT == "is slow to start":
+            # The first goal is lost if it is sent before both sides have found each other.
+            time.sleep(1.5 * random.Random().random())
         if FAULT == "hangs at its start":
             time.sleep(1000)
         if FAULT == "ignores being asked to end":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -249,6 +250,10 @@ NETWORK = {
 }
 
 
+#: What every run says whose nodes are not kept in step.
+LOOSE = "free-running clock: neither the run nor its verdict repeats"
+
+
 class Bridge:
     """Connects one campaign's worker with the nodes of a mapping."""
 
@@ -260,13 +265,14 @@ class Bridge:
     def serve(self) -> None:
         """Performs actions until the campaign is over."""
         os.environ.update(NETWORK)
-        name = self._mapping.file.stem + (" (free-running: its verdicts do not repeat)" if self._free_running else "")
+        name = self._mapping.file.stem + (f" ({LOOSE})" if self._free_running else "")
         fault: BrokenNode | ProtocolFault | None = None
         try:
             with Session(Wire.from_environment(), name, sorted(self._mapping.actions), on_reset=self._end_run) as session:
                 while (call := session.next_call()) is not None:
                     try:
-                        session.end(self._of_run(call, session).perform(call))
+                        done = self._of_run(call, session).perform(call)
+                        session.end(replace(done, message=f"{done.message} ({LOOSE})") if self._free_running else done)
                     except Aborted:
                         continue
         except (BrokenNode, ProtocolFault) as found:
