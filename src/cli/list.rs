@@ -87,7 +87,7 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
         campaign: args.campaign.clone(),
         ..RunFilter::default()
     };
-    let ChosenRuns {
+    let ListedRuns {
         mut runs,
         words,
         failed,
@@ -228,7 +228,7 @@ fn reason(history: &History, run: &str) -> String {
 
 /// The runs that the options choose.
 #[derive(Default)]
-struct ChosenRuns {
+struct ListedRuns {
     runs: Vec<RunRow>,
     /// The outcomes of the named properties by run: one text for each property, with the outcomes of
     /// all actions that have it.
@@ -242,7 +242,7 @@ fn chosen_runs(
     args: &ListArgs,
     history: &History,
     filter: &RunFilter,
-) -> Result<ChosenRuns, Diagnostics> {
+) -> Result<ListedRuns, Diagnostics> {
     let wanted = args.wanted();
     let by_outcome = wanted.is_some() || !args.property.is_empty();
     let judgements = if by_outcome {
@@ -250,7 +250,7 @@ fn chosen_runs(
     } else {
         Judgements::None
     };
-    let mut chosen = ChosenRuns::default();
+    let mut chosen = ListedRuns::default();
     let mut judged: BTreeSet<Arc<str>> = BTreeSet::new();
     history.each_judged(
         filter,
