@@ -101,7 +101,7 @@ fn the_search_finds_every_object_of_a_run() {
 
 /// "60.8 cm from the gripper" is the result; the cause is that the glass was perceived elsewhere.
 #[test]
-fn the_list_tells_the_cause() {
+fn the_list_shows_the_cause() {
     let project = shipped("pick").copied();
     let (mut browser, file) = opened(project.path());
     browser.open(&file, "/runs?outcome=failed");

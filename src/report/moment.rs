@@ -11,7 +11,7 @@ const LOST_SECS: f64 = 0.2;
 /// A gap between the fingers that is larger than the smallest one by at most this is as small. Unit:
 /// metres.
 const SAME_GAP_M: f64 = 0.002;
-/// Fingers that move by less than this between two measurements stand still. Unit: metres.
+/// Fingers that move by less than this between two measurements do not close. Unit: metres.
 const STILL_M: f64 = 1e-4;
 /// A hand closes if the gap becomes smaller by at least this. Unit: metres.
 const CLOSED_M: f64 = 0.01;

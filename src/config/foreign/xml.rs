@@ -358,7 +358,7 @@ impl<'a> Reader<'a> {
             return Some(());
         }
         let message = format!("the root is `<{found}>` instead of `<{name}>`");
-        // A fragment has the elements of MJCF, but is no model of its own.
+        // A fragment has the elements of MJCF, but not a whole model.
         let help = if MJCF_PARTS.contains(&found) {
             "this is a part of an MJCF model: name the file with `<mujoco>` that includes it"
         } else {

@@ -58,7 +58,7 @@ async function watchPair(known, place, { runs, address }, pair) {
   return undefined;
 }
 
-/** What happened, and each property, in both runs. Rows that differ are marked. */
+/** The cause and each property in both runs. Rows that differ are marked. */
 function pairTable(runs, pair, to) {
   const cell = (run, i) => {
     const outcome = runs.outcome(run, i), margin = runs.margins[i]?.[run];

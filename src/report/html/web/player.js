@@ -7,7 +7,7 @@ const ARROW_SECS = 0.5;
 /** Speeds of playback, as in the list of them. */
 const SPEEDS = [["0.25", "¼×"], ["0.5", "½×"], ["1", "1×"], ["2", "2×"], ["4", "4×"], ["8", "8×"]];
 /** Elements that use Space and arrows themselves. */
-const OWN_KEYS = "input, select, textarea, button, a, summary, [role=grid], .scroll, .proof";
+const OWN_KEYS = "input, select, button, a, summary, [role=grid], .scroll, .proof";
 
 /**
  * Plays runs on one clock. A side has a `replay` with its `forms`, the judged properties as `slots`, and a `name` if there
@@ -63,7 +63,7 @@ async function player(sides, noted = () => {}) {
     if (!key || event.defaultPrevented || event.shiftKey || event.ctrlKey || event.metaKey || event.altKey) return;
     // Other keys than Space and the arrows to the sides scroll the page, unless the player has the focus.
     const within = element.contains(event.target);
-    if (event.target.closest?.(OWN_KEYS) || (!within && !["  ", " ", "ArrowLeft", "ArrowRight"].includes(event.key))) return;
+    if (event.target.closest?.(OWN_KEYS) || (!within && ![" ", "ArrowLeft", "ArrowRight"].includes(event.key))) return;
     event.preventDefault();
     key();
   };

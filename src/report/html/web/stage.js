@@ -95,7 +95,7 @@ class Stage {
       const still = replay.still.find(({ name }) => name === pressed.thing), track = course.slot.get(pressed.thing);
       const form = forms[(still ?? course.tracks[track])?.form], corners = form && cornersOf(form);
       const pose = (secs) => still?.at ?? course.pose(track, secs);
-      this.tag = labels.add("pressed", pressed.label, () => pressed.at, (secs) => corners && corners.map((corner) => placed(pose(secs), corner)), true);
+      this.tag = labels.add("touch", pressed.label, () => pressed.at, (secs) => corners && corners.map((corner) => placed(pose(secs), corner)), true);
     }
     this.told = labels.add("gap", "", () => this.middle);
     const corners = new Map(course.tracks.map((track, slot) => [slot, track.name.startsWith("robot/") ? [] : cornersOf(forms[track.form])]));

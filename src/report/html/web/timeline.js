@@ -94,7 +94,7 @@ function actionBar(action, i, x) {
 /** Height of a row of phase names. Unit: pixels. */
 const PHASE_ROW = 12;
 
-/** The names of phases in two rows, each where it has room; `…` stands for names without any. */
+/** The names of phases in two rows, each where it has room; names without any are shortened to `…`. */
 function phaseNames(phases, end) {
   const ends = [-Infinity, -Infinity];
   return phases.map(([name, from], j) => {
