@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use crate::dataset::images::{DatasetImage, DrawImages, moments};
 use crate::dataset::write::DatasetRuns;
 use crate::tables::{new_text, unwritten};
-use actcheck_base::{Below, Diagnostics, Outcome};
+use actcheck_base::{Below, Diagnostic, Diagnostics, Outcome};
 use actcheck_data::Trace;
 use actcheck_history::RunDetail;
 
@@ -45,12 +45,19 @@ pub struct LerobotDataset {
 /// positions and the gap between the fingers; actions are their commanded values.
 ///
 /// # Errors
-/// `A001` if it can't be written; errors of reading the history or a trace.
+/// `A001` if it can't be written or the folder holds a dataset already; errors of reading the
+/// history or a trace.
 pub fn export_lerobot(
     runs: &DatasetRuns<'_>,
     folder: &Path,
     draw: &mut DrawImages<'_>,
 ) -> Result<LerobotDataset, Diagnostics> {
+    if folder.join("meta").exists() || folder.join("data").exists() {
+        let message = format!("{} holds a dataset already", folder.display());
+        return Err(Diagnostic::error("A001", message)
+            .help("name another folder, or delete this one")
+            .into());
+    }
     let mut written = LerobotDataset::default();
     let mut export = Export::new(folder);
     for (campaign, ids) in runs.history.run_ids()? {
@@ -341,7 +348,9 @@ impl<'a> Export<'a> {
         let write = || -> Result<(), PolarsError> {
             let columns = columns.into_iter().map(Column::from).collect();
             let mut table = DataFrame::new(height, columns)?;
-            let file = Below::new(self.folder).new_file(path)?;
+            let below = Below::new(self.folder);
+            below.create_folder(path.parent().unwrap_or(self.folder))?;
+            let file = below.new_file(path)?;
             ParquetWriter::new(file.writer()?)
                 .with_key_value_metadata(metadata)
                 .finish(&mut table)?;
