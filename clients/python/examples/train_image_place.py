@@ -49,7 +49,8 @@ def examples(folder: Path) -> tuple[NDArray[np.uint8], Array]:
             continue
         rgb = np.asarray(Image.open(io.BytesIO(seen[0]["png"])))
         focal_px = rgb.shape[1] / 2.0 / np.tan(0.5)  # the field of view of the configuration is 1 rad
-        x, left, up = camera_of(seen[0]).inverse() * np.array([true[0][axis] for axis in ("x_m", "y_m", "z_m")])
+        foot = Pose.upright([true[0][axis] for axis in ("x_m", "y_m", "z_m")])
+        x, left, up = (camera_of(seen[0]).inverse() * foot).position
         column, row = rgb.shape[1] / 2.0 - focal_px * left / x, rgb.shape[0] / 2.0 - focal_px * up / x
         if 0.0 <= column < rgb.shape[1] and 0.0 <= row < rgb.shape[0]:
             pictures.append(rgb)

@@ -5,14 +5,15 @@
 
 use std::path::{Path, PathBuf};
 
-use polars::io::parquet::write::KeyValueMetadata;
-use polars::prelude::{Column, DataFrame, NamedFrom as _, ParquetWriter, PolarsError, Series};
+use polars::prelude::{
+    AnyValue, Column, DataFrame, DataType, NamedFrom as _, ParquetWriter, PolarsError, Series,
+};
 use serde_json::{Value, json};
 
 use crate::dataset::images::{DatasetImage, DrawImages, moments};
 use crate::dataset::write::DatasetRuns;
 use crate::tables::{new_text, unwritten};
-use actcheck_base::{Below, Diagnostics, Outcome};
+use actcheck_base::{Below, Diagnostic, Diagnostics, Outcome};
 use actcheck_data::Trace;
 use actcheck_history::RunDetail;
 
@@ -45,12 +46,19 @@ pub struct LerobotDataset {
 /// positions and the gap between the fingers; actions are their commanded values.
 ///
 /// # Errors
-/// `A001` if it can't be written; errors of reading the history or a trace.
+/// `A001` if it can't be written or the folder holds a dataset already; errors of reading the
+/// history or a trace.
 pub fn export_lerobot(
     runs: &DatasetRuns<'_>,
     folder: &Path,
     draw: &mut DrawImages<'_>,
 ) -> Result<LerobotDataset, Diagnostics> {
+    if folder.join("meta").exists() || folder.join("data").exists() {
+        let message = format!("{} holds a dataset already", folder.display());
+        return Err(Diagnostic::error("A001", message)
+            .help("name another folder, or delete this one")
+            .into());
+    }
     let mut written = LerobotDataset::default();
     let mut export = Export::new(folder);
     for (campaign, ids) in runs.history.run_ids()? {
@@ -239,7 +247,6 @@ impl<'a> Export<'a> {
             let counts = frames.iter().enumerate();
             counts.map(|(idx, frame)| signed(of(idx, frame))).collect()
         };
-        let pictures: Vec<&[u8]> = frames.iter().map(|frame| frame.png.as_slice()).collect();
         let done: Vec<bool> = frames.iter().map(|frame| frame.is_last).collect();
         let success: Vec<bool> = frames
             .iter()
@@ -250,7 +257,7 @@ impl<'a> Export<'a> {
             .map(|won| f32::from(u8::from(*won)))
             .collect();
         let columns = vec![
-            Series::new(IMAGE.into(), pictures),
+            self.files(&frames)?,
             Series::new(STATE.into(), lists(|frame| &frame.state)),
             Series::new(ACTION.into(), lists(|frame| &frame.action)),
             Series::new("next.reward".into(), reward),
@@ -263,9 +270,17 @@ impl<'a> Export<'a> {
             Series::new("task_index".into(), count(&|_, frame| frame.task)),
         ];
         let path = self.folder.join("data").join(place(self.file));
-        self.write(&path, frames.len(), columns, None)?;
+        self.write(&path, frames.len(), columns)?;
         (self.bytes, self.file) = (0, self.file + 1);
         Ok(())
+    }
+
+    /// The column of images. Hugging Face's reader takes no views, which are the usual kind here.
+    fn files(&self, frames: &[Frame]) -> Result<Series, Diagnostics> {
+        let files = frames.iter().map(|frame| AnyValue::Binary(&frame.png));
+        let files: Vec<AnyValue<'_>> = files.collect();
+        Series::from_any_values_and_dtype(IMAGE.into(), &files, &DataType::BinaryOffset, true)
+            .map_err(|error| unwritten(self.folder, &error))
     }
 
     /// Writes the last data file, and the descriptions of the dataset.
@@ -275,12 +290,12 @@ impl<'a> Export<'a> {
         let numbers: Vec<i64> = (0..self.tasks.len()).map(signed).collect();
         let columns = vec![
             Series::new("task_index".into(), numbers),
-            Series::new("__index_level_0__".into(), &self.tasks),
+            Series::new("task".into(), &self.tasks),
         ];
         let path = meta.join("tasks.parquet");
-        self.write(&path, self.tasks.len(), columns, Some(index_of_tasks()))?;
+        self.write(&path, self.tasks.len(), columns)?;
         let path = meta.join("episodes").join(place(0));
-        self.write(&path, self.episodes.len(), self.episode_columns(), None)?;
+        self.write(&path, self.episodes.len(), self.episode_columns())?;
         let below = Below::new(self.folder);
         for (name, value) in [
             ("info.json", self.info()),
@@ -329,20 +344,14 @@ impl<'a> Export<'a> {
         ]
     }
 
-    fn write(
-        &self,
-        path: &Path,
-        height: usize,
-        columns: Vec<Series>,
-        metadata: Option<KeyValueMetadata>,
-    ) -> Result<(), Diagnostics> {
+    fn write(&self, path: &Path, height: usize, columns: Vec<Series>) -> Result<(), Diagnostics> {
         let write = || -> Result<(), PolarsError> {
             let columns = columns.into_iter().map(Column::from).collect();
             let mut table = DataFrame::new(height, columns)?;
-            let file = Below::new(self.folder).new_file(path)?;
-            ParquetWriter::new(file.writer()?)
-                .with_key_value_metadata(metadata)
-                .finish(&mut table)?;
+            let below = Below::new(self.folder);
+            below.create_folder(path.parent().unwrap_or(self.folder))?;
+            let file = below.new_file(path)?;
+            ParquetWriter::new(file.writer()?).finish(&mut table)?;
             Ok(file.finish()?)
         };
         write().map_err(|error| unwritten(path, &error))
@@ -408,22 +417,6 @@ fn place(number: usize) -> PathBuf {
 
 fn signed(count: usize) -> i64 {
     i64::try_from(count).unwrap_or(i64::MAX)
-}
-
-/// Makes pandas take the tasks' texts as the index of their table, as LeRobot does.
-fn index_of_tasks() -> KeyValueMetadata {
-    let column = |name: Option<&str>, field: &str, kind: &str, numpy: &str| json!({"name": name, "field_name": field, "pandas_type": kind, "numpy_type": numpy, "metadata": null});
-    let described = json!({
-        "index_columns": ["__index_level_0__"],
-        "column_indexes": [],
-        "columns": [
-            column(Some("task_index"), "task_index", "int64", "int64"),
-            column(None, "__index_level_0__", "unicode", "object"),
-        ],
-        "creator": {"library": "actcheck", "version": env!("CARGO_PKG_VERSION")},
-        "pandas_version": "2.0.0",
-    });
-    KeyValueMetadata::from_static(vec![("pandas".to_owned(), described.to_string())])
 }
 
 /// Extremes, mean and spread of each element of vectors of one length.
