@@ -3,6 +3,7 @@
 mod accessible;
 mod arms_aside;
 mod articulated;
+mod bags;
 mod bisect;
 mod bounds;
 mod broken;
@@ -104,6 +105,7 @@ mod report_page;
 mod resume;
 mod robots;
 mod rule_budgets;
+mod reviews;
 mod rules;
 mod rules_library;
 mod scenario;

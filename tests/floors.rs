@@ -64,7 +64,7 @@ const FENCES: [(&str, &[&str]); 34] = [
         "parry3d",
         &["geometry", "robot", "world", "scenario", "episodes"],
     ),
-    ("mcap", &["episodes"]),
+    ("mcap", &["episodes", "report"]),
     ("prost", &["episodes"]),
     ("pyo3", &["judge"]),
     ("urdf-rs", &["config"]),

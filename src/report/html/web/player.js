@@ -3,8 +3,8 @@
 /** A moment is noted after this pause, since browsers limit how often an address changes. Unit: milliseconds. */
 const NOTED_AFTER = 200;
 
-/** `slots` are the judged properties; `noted` gets each moment at which the player rests. */
-async function player(replay, slots, noted) {
+/** `slots` are the judged properties; `noted` gets each moment at which the player rests, and `moved` each that it shows. */
+async function player(replay, slots, noted, moved = () => {}) {
   const forms = await formsOf();
   const canvas = make("canvas", { class: "stage", tabindex: "0", "aria-label": "The run in 3D: drag or use the arrow keys to rotate, the wheel or + and − to zoom" });
   const slider = make("input", { type: "range", min: 0, step: "any", value: 0, "aria-label": "Moment of the run", class: "slider" });
@@ -32,6 +32,7 @@ async function player(replay, slots, noted) {
     clock.textContent = `${secs.toFixed(1)} / ${seconds.toFixed(1)} s`;
     stage.show(secs);
     line.mark(secs);
+    moved(secs);
     if (settled) note();
   };
   const set = (on) => {

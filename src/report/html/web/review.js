@@ -1,0 +1,226 @@
+// The page of a comparison: the answer, the rates, and scenes that flipped, with both replays side by side.
+
+const SIDES = ["A", "B"];
+const ANSWERS = { worse: "failed", better: "passed", same: "inapplicable", "no difference": "inapplicable", underpowered: "timeout" };
+const SAID = { underpowered: "undecided" };
+/** The largest number of lines of a list that is open from the start. */
+const MOST_OPEN = 12;
+
+function nameOf(line) {
+  return [local(line.action), line.property === null ? "whole run" : local(line.property)].filter(Boolean).join(" ");
+}
+
+/** A rate difference with its interval, on a scale from −100 to 100 %. */
+function differenceBar({ value, low, high }, answer) {
+  const x = (share) => 100 + 100 * share;
+  return make("svg", { class: `difference ${ANSWERS[answer]}`, viewBox: "0 0 200 16", role: "img",
+    "aria-label": `${signed(value)}, from ${signed(low)} to ${signed(high)}` },
+    make("line", { class: "axis", x1: 0, x2: 200, y1: 8, y2: 8 }),
+    make("line", { class: "zero", x1: 100, x2: 100, y1: 0, y2: 16 }),
+    make("rect", { class: "span", x: x(low), width: Math.max(1, x(high) - x(low)), y: 5, height: 6, rx: 3 }),
+    make("circle", { class: "dot", cx: x(value), cy: 8, r: 5 }));
+}
+
+/** A difference of shares in points: `+2.5`. */
+function signed(share) {
+  const points = (100 * share).toFixed(1).replace("-", "−");
+  return `${share > 0 ? "+" : ""}${points}`;
+}
+
+function rateTable(compared) {
+  const row = (line) => {
+    const { both, only_first: a, only_second: b, neither } = line.table, all = both + a + b + neither;
+    const wide = line.difference ? [differenceBar(line.difference, line.answer), make("span", { class: "faint" }, `${signed(line.difference.value)} [${signed(line.difference.low)}, ${signed(line.difference.high)}]`)] : "none decided";
+    return make("tr", {}, make("th", { scope: "row" }, nameOf(line)),
+      make("td", {}, badge(ANSWERS[line.answer], SAID[line.answer] ?? line.answer)),
+      make("td", {}, `${both + a}/${all}`), make("td", {}, `${both + b}/${all}`), make("td", { class: "span" }, wide),
+      make("td", {}, String(a)), make("td", {}, String(b)),
+      make("td", {}, line.p_holm < 0.0001 ? "< 0.0001" : line.p_holm.toFixed(4)));
+  };
+  const heads = ["passes in", "B is", "A", "B", "B − A, points [95 %]", "only in A", "only in B", "p, corrected"];
+  return make("section", {}, make("h2", {}, "Better, worse, undecided"), scroller("Rates of both sides", make("table", { class: "compared" },
+    make("thead", {}, make("tr", {}, heads.map((word) => make("th", { scope: "col" }, word)))),
+    make("tbody", {}, compared.lines.map(row)))),
+    make("p", { class: "faint more" }, `${count(compared.pairs)} scenes in both. The p-values are exact, two-sided, and corrected for ${counted(compared.lines.length, "line")}.`));
+}
+
+function sideLine(side, name) {
+  return make("div", {}, make("dt", {}, name), make("dd", {}, `${side.campaign} · ${side.config} · ${counted(side.runs, "run")}${side.runs < side.planned ? ` of ${side.planned}` : ""} · ${moment(side.started)}`));
+}
+
+/** The inputs that differ: program, skill, rules, models, and the lines of the configuration. */
+function changes(compared) {
+  const short = (digest) => digest === null ? "absent" : String(digest).replace(/[0-9a-f]{16,}/g, (digits) => digits.slice(0, 8));
+  const lines = [["−", compared.config_only_in_a], ["+", compared.config_only_in_b]];
+  return make("section", { class: "card changes" }, make("h2", {}, "What differs"),
+    compared.changes.length === 0 && make("p", {}, "Nothing: program, skill, configuration, models, ontology and rules are the same."),
+    make("ul", {}, compared.changes.map((change) => make("li", {}, make("b", {}, change.kind), ` ${change.name} `, make("span", { class: "faint" }, `${short(change.a)} → ${short(change.b)}`)))),
+    lines.some(([, texts]) => texts.length > 0) && make("div", { class: "diff", tabindex: "0", role: "group", "aria-label": "Lines of the configuration that differ" },
+      lines.map(([sign, texts]) => texts.map((text) => make("div", { class: sign === "+" ? "added" : "removed" }, `${sign} ${text}`)))));
+}
+
+function knownIssues(compared) {
+  return compared.known.length > 0 && make("section", { class: "card" }, make("h2", {}, "Known issues"), make("ul", {}, compared.known.map((issue) => make("li", {},
+    make("b", {}, issue.fails.join(", ")), ` fails in ${counted(issue.a.length, "run")} of A and ${issue.b.length} of B. ${issue.reason} `,
+    make("span", { class: "faint" }, issue.expired ? `The date ${issue.until} is over: these scenes count.` : `Until ${issue.until}, these scenes do not count.`)))));
+}
+
+/** The flipped scenes in groups, each a link to its two replays. */
+function flipList(review, current) {
+  if (review.groups.length === 0) return make("section", {}, make("h2", {}, "Flipped scenes"), make("p", {}, "No scene has another outcome."));
+  return make("section", { class: "flips" }, make("h2", {}, "Flipped scenes"), review.groups.map((group) => make("div", { class: `card group ${group.is_worse ? "failed" : "passed"}` },
+    make("h3", {}, group.words), group.origin && make("p", {}, `${group.origin[0].toUpperCase()}${group.origin.slice(1)}.`),
+    make("ul", { class: "pairs" }, group.pairs.slice(0, MOST_OPEN).map((pair) => make("li", {}, pairLink(pair, current)))),
+    group.pairs.length > MOST_OPEN && make("details", {}, make("summary", {}, `${group.pairs.length - MOST_OPEN} more`),
+      make("ul", { class: "pairs" }, group.pairs.slice(MOST_OPEN).map((pair) => make("li", {}, pairLink(pair, current))))))));
+}
+
+function pairLink(pair, current) {
+  const words = pair.a === pair.b ? pair.a : `${pair.a} / ${pair.b}`;
+  if (!pair.known) return make("span", { class: "faint" }, words);
+  return make("a", { href: addressOf([pair.a, pair.b]), "aria-current": pair === current ? "true" : null }, words);
+}
+
+/** A run beside its replay: what failed, what its program printed. */
+function sideOf(run, name, other) {
+  const outcomeThere = (judged) => other.judged.find((one) => one.step === judged.step && one.property === judged.property)?.outcome;
+  const flipped = run.judged.filter((judged) => outcomeThere(judged) !== judged.outcome);
+  const failed = run.judged.filter((judged) => judged.outcome === "failed" && !flipped.includes(judged));
+  const line = (judged) => make("li", {}, sign(judged.outcome), make("small", {}, ` ${judged.action} `), make("b", {}, judged.property), judged.witness && `: ${judged.witness}`,
+    judged.margin !== null && make("span", { class: "faint" }, ` margin ${number(judged.margin)}`));
+  return [
+    make("h3", {}, `${name}: ${run.run}`, run.status !== "completed" && [" ", badge(run.status === "timeout" ? "timeout" : "broken", run.status)]),
+    run.reason && make("p", { class: "note" }, run.reason),
+    flipped.length > 0 && make("ul", { class: "outcomes" }, flipped.map(line)),
+    failed.length > 0 && make("details", {}, make("summary", {}, `${counted(failed.length, "failure")} on both sides`), make("ul", { class: "outcomes" }, failed.map(line))),
+    make("details", { open: Boolean(run.output) }, make("summary", {}, "Output of the skill"), run.output ? make("pre", { class: "output", tabindex: "0" }, run.output) : make("p", { class: "faint" }, "None is kept.")),
+  ];
+}
+
+/** Both replays with one clock. */
+class Pair {
+  constructor(pair) {
+    this.pair = pair;
+    this.players = [];
+    this.ended = false;
+    this.places = SIDES.map(() => make("div", { class: "watch" }));
+    this.play = make("button", { type: "button", class: "play", "aria-label": "Play both" }, "▶");
+    this.slider = make("input", { type: "range", min: 0, max: 1, step: "any", value: 0, class: "slider", "aria-label": "Moment of both runs" });
+    this.clock = make("output", { class: "clock" });
+    this.pace = make("select", { "aria-label": "Speed" }, [["0.25", "¼×"], ["1", "1×"], ["2", "2×"], ["5", "5×"]].map(([value, words]) => make("option", { value }, words)));
+    this.pace.value = "1";
+    this.play.addEventListener("click", () => this.set(!this.playing));
+    this.slider.addEventListener("input", () => { this.set(false); this.show(Number(this.slider.value)); });
+    const { differ, runs } = pair.known;
+    this.element = make("section", { class: "both" },
+      make("h2", {}, "Side by side"),
+      differ && make("p", { class: "differ" }, `${differ.words[0].toUpperCase()}${differ.words.slice(1)}. `, make("button", { type: "button", class: "flat", onclick: () => { this.set(false); this.show(differ.secs); } }, "show the moment")),
+      make("div", { class: "controls" }, this.play, this.slider, this.clock, this.pace),
+      make("div", { class: "two" }, runs.map((run, i) => make("div", { class: "side" }, make("div", {}, sideOf(run, SIDES[i], runs[1 - i])), this.places[i]))));
+  }
+
+  async load(review) {
+    const replays = await Promise.all(this.pair.known.runs.map((run) => {
+      const at = review.replays.indexOf(run.key);
+      return at < 0 ? null : unpack(`replay-${at}`);
+    }));
+    for (const [i, replay] of replays.entries()) {
+      if (!replay?.courses?.frames) {
+        fill(this.places[i], make("p", { class: "note" }, "This run has no replay in this file."));
+        continue;
+      }
+      const made = await player(replay, review.slots, () => {}, (secs) => this.follow(i, secs));
+      if (this.ended) return made.end();
+      this.players.push({ made, side: i, seconds: Number(made.element.querySelector(".slider").max) });
+      fill(this.places[i], made.element);
+    }
+    this.seconds = Math.max(0, ...this.players.map((one) => one.seconds));
+    this.slider.max = this.seconds;
+    const first = replays.flatMap((replay) => replay?.actions ?? []).flatMap((action) => action.judged ?? []).map((judged) => judged.stated).find((secs) => typeof secs === "number");
+    const secs = first ?? this.pair.known.differ?.secs ?? 0;
+    this.players.forEach(({ made }) => { this.busy = true; made.begin(secs); this.busy = false; });
+    this.show(secs);
+    this.element.dataset.ready = "true";
+    return undefined;
+  }
+
+  /** Moves the other run along if one was moved by its own timeline. */
+  follow(side, secs) {
+    if (this.busy) return;
+    this.set(false);
+    this.show(secs, side);
+  }
+
+  show(secs, from) {
+    this.secs = Math.min(this.seconds ?? 0, Math.max(0, secs));
+    this.slider.value = this.secs;
+    this.slider.setAttribute("aria-valuetext", `${this.secs.toFixed(1)} seconds`);
+    this.clock.textContent = `${this.secs.toFixed(1)} / ${(this.seconds ?? 0).toFixed(1)} s`;
+    this.busy = true;
+    this.players.filter(({ side }) => side !== from).forEach(({ made }) => made.seek(this.secs));
+    this.busy = false;
+  }
+
+  set(on) {
+    if (on === Boolean(this.playing)) return;
+    this.playing = on;
+    this.play.textContent = on ? "❚❚" : "▶";
+    this.play.setAttribute("aria-label", on ? "Pause both" : "Play both");
+    if (!on) return;
+    if (this.secs >= this.seconds) this.show(0);
+    let last = performance.now();
+    const step = (now) => {
+      if (!this.playing || !this.element.isConnected) return;
+      this.show(this.secs + (now - last) / 1000 * Number(this.pace.value));
+      last = now;
+      if (this.secs >= this.seconds) this.set(false);
+      else requestAnimationFrame(step);
+    };
+    requestAnimationFrame(step);
+  }
+
+  end() {
+    this.ended = true;
+    this.playing = false;
+    this.players.forEach(({ made }) => made.end());
+  }
+}
+
+async function reviewMain() {
+  const element = document.getElementById("main");
+  try {
+    const review = await unpack("review"), { compared } = review;
+    document.title = "actcheck: comparison";
+    document.body.prepend(make("header", { class: "top" }, make("span", { class: "mark" }, "actcheck"),
+      make("span", { class: "faint whence" }, `${compared.a.name} → ${compared.b.name} · ${moment(review.made)}`), themeButton()));
+    element.after(make("footer", { class: "faint" }, `actcheck ${review.version} · generated ${review.made}. Drawn in 3D by three.js (MIT).`));
+    const place = make("div", {}), lists = make("div", {});
+    element.className = "review";
+    fill(element,
+      make("h1", {}, review.headline, " ", badge(ANSWERS[compared.answer], SAID[compared.answer] ?? compared.answer)),
+      make("dl", { class: "facts" }, sideLine(compared.a, "A"), sideLine(compared.b, "B")),
+      make("div", { class: "first" }, lists, changes(compared)), knownIssues(compared), place, rateTable(compared));
+    const pairs = review.groups.flatMap((group) => group.pairs).filter((pair) => pair.known);
+    let shown = null;
+    const go = (chosen) => {
+      const { way } = wayOf(location.hash);
+      const pair = pairs.find((one) => one.a === way[0] && one.b === way[1]) ?? pairs[0];
+      fill(lists, flipList(review, pair));
+      if (!pair || shown?.pair === pair) return;
+      shown?.end();
+      shown = new Pair(pair);
+      fill(place, shown.element);
+      if (chosen) shown.element.scrollIntoView({ block: "start" });
+      shown.load(review).catch((error) => put(place, make("p", { class: "note" }, `Can't show these runs in 3D: ${error.message}`)));
+    };
+    addEventListener("hashchange", () => go(true));
+    go(false);
+    document.documentElement.dataset.ready = String(Math.round(performance.now()));
+  } catch (error) {
+    fill(element, make("h1", {}, "The comparison can't be read"), make("p", {}, error.message),
+      make("p", {}, "The file may be truncated, or the browser may be older than 2023."));
+    throw error;
+  }
+}
+
+reviewMain();
