@@ -48,23 +48,31 @@ fn bags_are_read_by_other_libraries() {
         let read: Value = serde_json::from_str(&stdout(&read)).unwrap();
         check(&run, &read);
         let drives = config == "pick_and_place.toml";
-        assert_eq!(read["counts"]["/base_believed"].is_number(), drives, "{config}");
+        assert_eq!(
+            read["counts"]["/base_believed"].is_number(),
+            drives,
+            "{config}"
+        );
     }
 }
 
 /// Checks a bag against the history.
 fn check(run: &RunDetail, read: &Value) {
     let outcomes = read["outcomes"].as_array().unwrap();
-    let judged = run
-        .actions
-        .iter()
-        .flat_map(|action| action.judgements.iter().map(move |judged| (action.step, judged)));
+    let judged = run.actions.iter().flat_map(|action| {
+        action
+            .judgements
+            .iter()
+            .map(move |judged| (action.step, judged))
+    });
     for (written, (step, judged)) in outcomes.iter().zip(judged.clone()) {
         assert_eq!(written["property"], judged.property);
         assert_eq!(written["step"], step.to_string());
         assert_eq!(written["outcome"], judged.outcome.word());
         assert_eq!(written["level"] == 2, judged.outcome == Outcome::Failed);
-        let margin = written["margin"].as_str().map(|margin| margin.parse().unwrap());
+        let margin = written["margin"]
+            .as_str()
+            .map(|margin| margin.parse().unwrap());
         assert_eq!(margin, judged.margin);
     }
     assert_eq!(outcomes.len(), judged.count());
@@ -77,7 +85,10 @@ fn check(run: &RunDetail, read: &Value) {
     }
     assert!(read["links"].as_array().unwrap().len() > 5, "{read}");
     for kind in ["objects", "furniture", "contacts"] {
-        assert!(!read["markers"][kind].as_array().unwrap().is_empty(), "{kind}");
+        assert!(
+            !read["markers"][kind].as_array().unwrap().is_empty(),
+            "{kind}"
+        );
     }
     assert!(read["strongest"].as_f64().unwrap() > 0.0);
     let seconds: f64 = run.actions.iter().map(|action| action.duration_secs).sum();
@@ -93,10 +104,53 @@ fn the_same_run_gives_the_same_bag() {
     exported(folder.path(), &run, "b.mcap");
     let [a, b] = ["a.mcap", "b.mcap"].map(|name| std::fs::read(folder.path().join(name)).unwrap());
     assert!(a.starts_with(b"\x89MCAP0\r\n") && a == b);
-    let printed = actcheck(folder.path(), &["export", "run", &run, "--mcap", "-", "--history", "h"]);
+    let printed = actcheck(
+        folder.path(),
+        &["export", "run", &run, "--mcap", "-", "--history", "h"],
+    );
     assert!(printed.stdout == a);
-    let unknown = actcheck(folder.path(), &["export", "none-7", "--mcap", "c.mcap", "--history", "h"]);
+    let unknown = actcheck(
+        folder.path(),
+        &["export", "none-7", "--mcap", "c.mcap", "--history", "h"],
+    );
     assert_eq!(unknown.status.code(), Some(2));
     assert!(stderr(&unknown).contains("H008"), "{}", stderr(&unknown));
     assert!(!folder.path().join("c.mcap").exists());
+}
+
+/// An imported episode has neither a robot of ours nor joints.
+#[test]
+fn a_bag_of_an_episode_has_frames_and_outcomes() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = root().join("tests/data/episodes");
+    let [episode, mapping] = ["good-000001.mcap", "made.toml"].map(|name| data.join(name));
+    let imported = actcheck(
+        folder.path(),
+        &[
+            "import",
+            episode.to_str().unwrap(),
+            "--mapping",
+            mapping.to_str().unwrap(),
+            "--history",
+            "h",
+        ],
+    );
+    assert!(imported.status.code() < Some(2), "{}", stderr(&imported));
+    let history = History::open_to_read(&folder.path().join("h")).unwrap();
+    let run = format!("{}-1", history.campaigns().unwrap()[0].id);
+    drop(history);
+    exported(folder.path(), &run, "run.mcap");
+    let Some(python) = foreign::bags() else {
+        return;
+    };
+    let read = Command::new(python)
+        .arg(root().join("tests/foreign/check_bag.py"))
+        .arg(folder.path().join("run.mcap"))
+        .output()
+        .unwrap();
+    assert!(read.status.success(), "{}", stderr(&read));
+    let read: Value = serde_json::from_str(&stdout(&read)).unwrap();
+    assert_eq!(read["frames"]["cube"], "map");
+    assert!(read["counts"]["/robot_description"].is_null());
+    assert!(!read["outcomes"].as_array().unwrap().is_empty());
 }

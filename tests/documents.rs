@@ -322,7 +322,10 @@ fn the_github_workflow_reports_and_accepts_an_equal_change() {
         );
     }
     let summary = read(&checkout.path().join("summary.md"));
-    assert!(summary.starts_with("## actcheck: A and B are the same"), "{summary}");
+    assert!(
+        summary.starts_with("## actcheck: A and B are the same"),
+        "{summary}"
+    );
 }
 
 #[test]
@@ -355,7 +358,13 @@ fn the_gitlab_pipeline_reports_and_refuses_a_worse_change() {
         stderr(&output)
     );
     let review = read(&checkout.path().join("compare.md"));
-    assert!(review.starts_with("## actcheck: B is worse than A"), "{review}");
-    assert!(review.contains("moved\\_object.rls") && review.contains("fail in B only"), "{review}");
+    assert!(
+        review.starts_with("## actcheck: B is worse than A"),
+        "{review}"
+    );
+    assert!(
+        review.contains("moved\\_object.rls") && review.contains("fail in B only"),
+        "{review}"
+    );
     assert!(!read(&checkout.path().join("compare.html")).is_empty());
 }

@@ -13,10 +13,17 @@ use crate::support::{actcheck, edit, project, stderr, stdout};
 /// `change`. Returns the ids of the campaigns.
 fn changed(folder: &Path) -> [String; 2] {
     let ran = |history: &str| {
-        let arguments = ["run", "configs/pick.toml", "--runs", "6", "--format", "json"];
+        let arguments = [
+            "run",
+            "configs/pick.toml",
+            "--runs",
+            "6",
+            "--format",
+            "json",
+        ];
         let output = actcheck(folder, &[&arguments, &["--history", history][..]].concat());
-        let json: Value =
-            serde_json::from_str(&stdout(&output)).unwrap_or_else(|_| panic!("{}", stderr(&output)));
+        let json: Value = serde_json::from_str(&stdout(&output))
+            .unwrap_or_else(|_| panic!("{}", stderr(&output)));
         json["campaign"].as_str().unwrap().to_owned()
     };
     let base = ran("base");
@@ -29,7 +36,10 @@ fn changed(folder: &Path) -> [String; 2] {
 }
 
 fn review(folder: &Path, arguments: &[&str]) -> Output {
-    actcheck(folder, &[&["compare", "base", "change"], arguments].concat())
+    actcheck(
+        folder,
+        &[&["compare", "base", "change"], arguments].concat(),
+    )
 }
 
 /// Regression: campaigns of two revisions in two histories had the same ids, so that a flip was
@@ -59,14 +69,23 @@ fn a_change_is_reviewed_in_markdown_and_in_a_browser() {
         browser.open(&folder.join("c.html"), "/");
         browser.until("document.querySelector('.both').dataset.ready");
         let wide = browser.value("document.documentElement.scrollWidth");
-        assert!(wide.as_u64().unwrap() <= u64::from(width), "{wide} at {width}");
+        assert!(
+            wide.as_u64().unwrap() <= u64::from(width),
+            "{wide} at {width}"
+        );
     }
-    assert_eq!(browser.value("document.querySelectorAll('canvas.stage').length"), json!(2));
+    assert_eq!(
+        browser.value("document.querySelectorAll('canvas.stage').length"),
+        json!(2)
+    );
     moves_in_step(&mut browser);
     let first = browser.value("document.querySelector('.both h3').textContent");
     browser.value("document.querySelectorAll('.pairs a')[1].click()");
     browser.until("document.querySelector('.both').dataset.ready");
-    assert_ne!(browser.value("document.querySelector('.both h3').textContent"), first);
+    assert_ne!(
+        browser.value("document.querySelector('.both h3').textContent"),
+        first
+    );
     if let Some(script) = axe() {
         browser.value(&format!("{script};0"));
         let found = browser.value(
@@ -96,7 +115,9 @@ fn known_issues_are_set_apart_until_their_day() {
     let folder = project.path();
     changed(folder);
     let known = |fails: &str, until: &str| {
-        let text = format!("[[issue]]\nfails = [{fails}]\nreason = \"the limit is too high\"\nuntil = \"{until}\"\n");
+        let text = format!(
+            "[[issue]]\nfails = [{fails}]\nreason = \"the limit is too high\"\nuntil = \"{until}\"\n"
+        );
         std::fs::write(folder.join("known.toml"), text).unwrap();
         let gate = ["--known-issues", "known.toml", "--fail-if-worse", "0.5"];
         review(folder, &[&gate, &["--format", "json"][..]].concat())
@@ -105,19 +126,30 @@ fn known_issues_are_set_apart_until_their_day() {
     assert!(stderr(&counted).contains("X098"), "{}", stderr(&counted));
     assert_eq!(counted.status.code(), Some(1), "{}", stdout(&counted));
     let apart = known("\"MovedObject\"", "9999-12-31");
-    assert_eq!(apart.status.code(), Some(0), "{}{}", stdout(&apart), stderr(&apart));
-    let [counted, apart] = [counted, apart].map(|output| -> Value {
-        serde_json::from_str(&stdout(&output)).unwrap()
-    });
+    assert_eq!(
+        apart.status.code(),
+        Some(0),
+        "{}{}",
+        stdout(&apart),
+        stderr(&apart)
+    );
+    let [counted, apart] =
+        [counted, apart].map(|output| -> Value { serde_json::from_str(&stdout(&output)).unwrap() });
     let excused = apart["known"][0]["b"].as_array().unwrap().len() as u64;
     assert!(excused > 0, "{apart:#}");
     let pairs = |json: &Value| json["pairs"].as_u64().unwrap();
     assert_eq!(pairs(&counted), pairs(&apart) + excused);
-    assert_eq!([&counted, &apart].map(|json| json["known"][0]["expired"].clone()), [json!(true), json!(false)]);
+    assert_eq!(
+        [&counted, &apart].map(|json| json["known"][0]["expired"].clone()),
+        [json!(true), json!(false)]
+    );
     let wrong = known("\"MoveObject\"", "9999-12-31");
     assert_eq!(wrong.status.code(), Some(2));
     let said = stderr(&wrong);
-    assert!(said.contains("X045") && said.contains("MovedObject"), "{said}");
+    assert!(
+        said.contains("X045") && said.contains("MovedObject"),
+        "{said}"
+    );
     let missing = review(folder, &["--known-issues", "none.toml"]);
     assert!(stderr(&missing).contains("C001"), "{}", stderr(&missing));
     let both = review(folder, &["--html", "-", "--markdown", "-"]);

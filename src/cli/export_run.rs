@@ -135,9 +135,7 @@ fn export_bag(history: &History, args: &ExportRunArgs, file: &Path) -> Result<()
         run.row.run
     ));
     if robot.is_none() {
-        output::print_prose(
-            "it lacks /robot_description: the robot of its campaign can't be read any more\n",
-        );
+        output::print_prose("it lacks /robot_description: the model of its robot is not known\n");
     }
     Ok(())
 }

@@ -8,9 +8,10 @@ use crate::compare::{CompareArgs, Histories, Side};
 use crate::options::BYTES_IN_A_MB;
 use crate::report_html::words;
 use crate::why::ontology_file;
-use crate::{clock, output, output_file, replayed_runs, restore};
+use crate::{clock, output_file, replayed_runs, restore};
 use actcheck_base::{Diagnostic, Diagnostics};
-use actcheck_history::History;
+use actcheck_data::Role;
+use actcheck_history::{History, RunDetail};
 use actcheck_ontology::{self as ontology, Ontology};
 use actcheck_report::{
     CompareSummary, ReplayedRun, Replays, Review, ReviewPage, ReviewPair, ReviewRun, divergence,
@@ -133,7 +134,8 @@ impl Flips {
                 };
                 let traces = a.1.as_ref().zip(b.1.as_ref());
                 let known = ReviewPair {
-                    divergence: traces.and_then(|(a, b)| divergence(a, b)),
+                    divergence: traces
+                        .and_then(|(one, other)| divergence(one, other, &targets(&a.0))),
                     runs: [
                         self.side("a", a, &mut looks[0])?,
                         self.side("b", b, &mut looks[1])?,
@@ -168,6 +170,15 @@ impl Flips {
             detail: detail.clone(),
         })
     }
+}
+
+/// The ids of the objects that the robot is to handle.
+fn targets(run: &RunDetail) -> Vec<&str> {
+    let objects = run.objects.iter();
+    objects
+        .filter(|object| object.role == Role::Target)
+        .map(|object| object.id.as_str())
+        .collect()
 }
 
 /// Reads runs of a history, by their ids.

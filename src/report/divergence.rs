@@ -6,8 +6,8 @@ use actcheck_data::Trace;
 
 /// Bodies that are farther apart than this are at different places. Unit: metres.
 const APART_M: f64 = 0.001;
-/// The grippers are compared so long after the runs began to differ. Unit: seconds.
-const LATER_SECS: f64 = 1.0;
+/// A contact that ends closer than this to the end of its run was not released. Unit: seconds.
+const RELEASED_SECS: f64 = 0.2;
 
 /// The moment at which two runs begin to differ.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,13 +19,25 @@ pub struct Divergence {
     /// The body that is farthest from its place in the other run then: id of an object, or
     /// `robot/LINK`. `None` if one run only goes on for longer.
     pub body: Option<String>,
-    /// Position of the second run's gripper relative to the first one's, so long after that time.
-    /// Units: seconds; metres, in the world's frame.
-    pub gripper: Option<(f64, [f64; 3])>,
+    /// The robot's first touch of a target.
+    pub touch: Option<SharedEvent>,
+    /// The end of its last touch of a target, if it released that.
+    pub release: Option<SharedEvent>,
 }
 
-/// Returns the moment at which two runs begin to differ; `None` if all bodies move alike.
-pub fn divergence(first: &Trace, second: &Trace) -> Option<Divergence> {
+/// An event that both runs have.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SharedEvent {
+    /// Its time in each run, since the run began. Unit: seconds.
+    pub secs: [f64; 2],
+    /// Position of the second run's gripper relative to the first one's, each at its time. Unit: metres.
+    /// Frame: world.
+    pub gripper_m: [f64; 3],
+}
+
+/// Returns the moment at which two runs begin to differ; `None` if all bodies move alike. `targets` are
+/// the ids of the objects that the robot is to handle.
+pub fn divergence(first: &Trace, second: &Trace, targets: &[&str]) -> Option<Divergence> {
     let (rows, others) = (&first.frames.rows, &second.frames.rows);
     let slots: BTreeMap<&str, usize> = second
         .frames
@@ -58,14 +70,49 @@ pub fn divergence(first: &Trace, second: &Trace) -> Option<Divergence> {
     let (idx, body) =
         differing.or_else(|| (rows.len() != others.len()).then_some((shorter, None)))?;
     let secs = idx as f64 * first.frames.period_secs;
-    let later = secs + LATER_SECS;
-    let grippers = gripper(first, later).zip(gripper(second, later));
+    let both = |event: fn(&Trace, &[&str]) -> Option<f64>| {
+        let secs = [event(first, targets)?, event(second, targets)?];
+        let (a, b) = (gripper(first, secs[0])?, gripper(second, secs[1])?);
+        let gripper_m = [0, 1, 2].map(|axis| b[axis] - a[axis]);
+        Some(SharedEvent { secs, gripper_m })
+    };
     Some(Divergence {
         secs,
         phases: [phase(first, secs), phase(second, secs)],
         body,
-        gripper: grippers.map(|(a, b)| (later, [0, 1, 2].map(|axis| b[axis] - a[axis]))),
+        touch: both(touched),
+        release: both(released),
     })
+}
+
+/// The contacts of the robot with targets: start and end of each. Unit: seconds since the run began.
+fn touches<'a>(trace: &'a Trace, targets: &'a [&str]) -> impl Iterator<Item = [f64; 2]> + 'a {
+    trace
+        .actions
+        .iter()
+        .zip(starts(trace))
+        .flat_map(move |(action, start)| {
+            let of_target = action.contacts.iter().filter(|contact| {
+                let mut pair = contact.pair.iter().map(String::as_str);
+                contact.pair.iter().any(|body| body.starts_with("robot/"))
+                    && pair.any(|body| targets.contains(&body))
+            });
+            of_target.map(move |contact| [start + contact.start_secs, start + contact.end_secs])
+        })
+}
+
+fn touched(trace: &Trace, targets: &[&str]) -> Option<f64> {
+    touches(trace, targets)
+        .map(|[start, _]| start)
+        .reduce(f64::min)
+}
+
+fn released(trace: &Trace, targets: &[&str]) -> Option<f64> {
+    let last = touches(trace, targets)
+        .map(|[_, end]| end)
+        .reduce(f64::max)?;
+    let end = starts(trace).last()?;
+    (last < end - RELEASED_SECS).then_some(last)
 }
 
 fn place(row: &[f32], slot: usize) -> [f64; 3] {
@@ -96,8 +143,8 @@ fn phase(trace: &Trace, secs: f64) -> Option<String> {
         .iter()
         .rfind(|phase| start + phase.start_secs <= secs);
     Some(match begun {
-        Some(phase) => format!("{} {}", action.action, phase.name),
-        None => action.action.clone(),
+        Some(phase) if phase.name != action.action => format!("{} {}", action.action, phase.name),
+        _ => action.action.clone(),
     })
 }
 
@@ -127,7 +174,9 @@ fn gripper(trace: &Trace, secs: f64) -> Option<[f64; 3]> {
 mod tests {
     use super::*;
     use crate::made_up::snapshot;
-    use actcheck_data::{ActionEnd, ActionTrace, Frames, Phase, RobotCourse, Samples, Series};
+    use actcheck_data::{
+        ActionEnd, ActionTrace, ContactEpisode, Frames, Phase, RobotCourse, Samples, Series,
+    };
 
     /// A run of 4 s in which the hand rises from the given time on, at 0.1 m/s.
     fn run(rises_at: Option<f64>, n_frames: usize) -> Trace {
@@ -160,6 +209,13 @@ mod tests {
                 end: ActionEnd::Completed,
                 duration_secs: 4.0,
                 phases: phases.into(),
+                contacts: vec![ContactEpisode {
+                    pair: ["mug_1".to_owned(), "robot/finger".to_owned()],
+                    start_secs: 1.0,
+                    end_secs: 3.0,
+                    max_force_n: 5.0,
+                    point_m: [0.0; 3],
+                }],
                 ..ActionTrace::not_reached("Place", &BTreeMap::new())
             }],
             frames: Frames {
@@ -181,20 +237,25 @@ mod tests {
 
     #[test]
     fn the_first_difference_has_its_phase_and_the_way_of_the_gripper() {
-        let found = divergence(&run(None, 40), &run(Some(2.0), 40)).expect("they differ");
+        let found =
+            divergence(&run(None, 40), &run(Some(2.0), 40), &["mug_1"]).expect("they differ");
         assert!((found.secs - 2.1).abs() < 1e-9, "{found:?}");
         let phase = Some("Place release".to_owned());
         assert_eq!(found.phases, [phase.clone(), phase]);
         assert_eq!(found.body.as_deref(), Some("robot/hand"));
-        let (secs, [x, y, z]) = found.gripper.expect("both have one");
-        assert!((secs - 3.1).abs() < 1e-9 && x == 0.0 && y == 0.0);
-        assert!((z - 0.11).abs() < 1e-3, "{z}");
+        let touch = found.touch.expect("both touch it");
+        assert_eq!((touch.secs, touch.gripper_m), ([1.0; 2], [0.0; 3]));
+        let release = found.release.expect("both release it");
+        assert_eq!(release.secs, [3.0; 2]);
+        assert!((release.gripper_m[2] - 0.1).abs() < 1e-3, "{release:?}");
+        let none = divergence(&run(None, 40), &run(Some(2.0), 40), &[]).expect("they differ");
+        assert_eq!((none.touch, none.release), (None, None));
     }
 
     #[test]
     fn runs_that_only_differ_in_length_differ_at_the_end_of_the_shorter_one() {
-        assert_eq!(divergence(&run(None, 40), &run(None, 40)), None);
-        let found = divergence(&run(None, 30), &run(None, 40)).expect("one is longer");
+        assert_eq!(divergence(&run(None, 40), &run(None, 40), &[]), None);
+        let found = divergence(&run(None, 30), &run(None, 40), &[]).expect("one is longer");
         assert!((found.secs - 3.0).abs() < 1e-9 && found.body.is_none());
     }
 }

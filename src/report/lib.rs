@@ -23,7 +23,7 @@ mod text;
 mod xml;
 
 pub use bag::{BagFault, BagInput, bag};
-pub use divergence::{Divergence, divergence};
+pub use divergence::{Divergence, SharedEvent, divergence};
 pub use formats::{
     Attachment, EarlReport, JunitReport, MarkdownReport, Repetitions, allure_common,
     allure_results, markdown, observation, review_markdown,

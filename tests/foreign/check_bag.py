@@ -81,7 +81,7 @@ def main(path):
     for _, message in found.get("/robot_description", []):
         links = [link.get("name") for link in ET.fromstring(message.data).iter("link")]
         assert set(links) <= set(parents) | {"map"}, set(links) - set(parents)
-    for nanos, message in found["/joint_states"]:
+    for nanos, message in found.get("/joint_states", []):
         names = list(message.name)
         assert len(set(names)) == len(names) > 0
         for values in (message.position, message.velocity, message.effort):

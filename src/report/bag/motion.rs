@@ -10,7 +10,7 @@ use nalgebra::Isometry3;
 use crate::bag::cdr::{Cdr, Stamp};
 use crate::bag::recorder::Recorder;
 use crate::bag::types::{BASE_BELIEVED, JOINT_STATES, TF, TF_STATIC};
-use actcheck_data::{ModelTree, Pose, Trace, TreeJoint};
+use actcheck_data::{ModelTree, Pose, Trace};
 
 /// The frame of the world.
 pub(super) const MAP: &str = "map";
@@ -27,6 +27,9 @@ pub(super) struct Frames {
     first: BTreeMap<String, Isometry3<f64>>,
     /// Names of links, which objects can't have.
     links: BTreeSet<String>,
+    /// Rigid links that the trace does not know: each with its parent and its pose in that frame, after
+    /// its parent.
+    rigid: Vec<(String, String, Isometry3<f64>)>,
 }
 
 impl Frames {
@@ -39,7 +42,16 @@ impl Frames {
             fixed: BTreeMap::new(),
             moving: BTreeMap::new(),
             first: BTreeMap::new(),
-            links: links.clone().map(|link| link.name.clone()).collect(),
+            links: links
+                .clone()
+                .map(|link| &link.name)
+                .chain(
+                    tree.iter()
+                        .flat_map(|tree| tree.links.iter().map(|link| &link.name)),
+                )
+                .cloned()
+                .collect(),
+            rigid: Vec::new(),
         };
         let at_first: Vec<(String, Isometry3<f64>)> = links
             .map(|link| (link.name.clone(), link.pose.to_isometry()))
@@ -70,36 +82,43 @@ impl Frames {
         let names = self.first.keys().chain(self.moving.keys());
         self.parents = names.map(|name| (name.clone(), MAP.to_owned())).collect();
         let joints = tree.map_or(&[][..], |tree| &tree.joints);
-        let joins = |links: &BTreeSet<String>, joint: &TreeJoint| {
-            joint.child != MAP && links.contains(&joint.parent)
-        };
-        let mut rigid = BTreeSet::new();
-        for joint in joints.iter().filter(|joint| joins(&self.links, joint)) {
-            if self.links.contains(&joint.child) {
-                self.parents
-                    .insert(joint.child.clone(), joint.parent.clone());
-                if !joint.motion.moves() {
-                    rigid.insert(joint.child.clone());
-                }
-            }
-        }
         // Links that the trace does not know, such as marks, are rigid.
         let mut is_complete = false;
         while !is_complete {
             is_complete = true;
-            for joint in joints {
-                if joins(&self.links, joint) && self.links.insert(joint.child.clone()) {
+            for joint in joints.iter().filter(|joint| joint.child != MAP) {
+                let Some(above) = self.first.get(&joint.parent).copied() else {
+                    continue;
+                };
+                if !self.first.contains_key(&joint.child) {
                     is_complete = false;
-                    self.parents
-                        .insert(joint.child.clone(), joint.parent.clone());
-                    self.fixed.insert(joint.child.clone(), joint.origin);
+                    let (child, parent) = (joint.child.clone(), joint.parent.clone());
+                    self.first.insert(child.clone(), above * joint.origin);
+                    self.rigid.push((child, parent, joint.origin));
                 }
             }
         }
+        let mut fixed: BTreeSet<&String> = self.rigid.iter().map(|(child, ..)| child).collect();
+        for joint in joints {
+            let are_known = [&joint.child, &joint.parent].map(|link| self.first.contains_key(link));
+            if joint.child != MAP && are_known == [true; 2] {
+                self.parents
+                    .insert(joint.child.clone(), joint.parent.clone());
+                if !joint.motion.moves() {
+                    fixed.insert(&joint.child);
+                }
+            }
+        }
+        let carried: BTreeSet<&str> = self
+            .rigid
+            .iter()
+            .map(|(child, ..)| child.as_str())
+            .collect();
         for (name, pose) in &self.first {
             let parent = self.parents.get(name).map_or(MAP, String::as_str);
-            let is_still = |frame: &str| frame == MAP || !self.moving.contains_key(frame);
-            if rigid.contains(name) || is_still(name) && is_still(parent) {
+            let is_still =
+                |frame: &str| !self.moving.contains_key(frame) && !carried.contains(frame);
+            if fixed.contains(name) || is_still(name) && is_still(parent) {
                 let above = self.first.get(parent).copied().unwrap_or_default();
                 self.fixed.insert(name.clone(), above.inv_mul(pose));
             }
@@ -124,6 +143,10 @@ impl Frames {
         for (idx, row) in trace.frames.rows.iter().enumerate() {
             for (name, slot) in &self.moving {
                 last.extend(track(row, *slot).map(|pose| (name, pose)));
+            }
+            for (child, parent, pose) in &self.rigid {
+                let above = last.get(parent).copied().unwrap_or_default();
+                last.insert(child, above * pose);
             }
             let moved = self
                 .parents

@@ -74,7 +74,7 @@ fn begin(writer: &mut Writer<Cursor<Vec<u8>>>, topic: &Topic) -> Result<u16, Bag
 /// The quality of service of a topic, in YAML, with the numbers of rmw: all versions of `rosbag2` read
 /// these in a file without a version.
 fn profile(topic: &Topic) -> String {
-    /// Longest time, which stands for no limit.
+    /// The longest time: no limit.
     const NEVER: &str = "{sec: 9223372036, nsec: 854775807}";
     let durability = if topic.is_latched { 1 } else { 2 };
     format!(

@@ -10,7 +10,7 @@ use crate::html::page::assembled;
 use crate::html::scripts::REVIEW_SCRIPT;
 use crate::html::{PropertyWords, Replays};
 use crate::json::compare_json;
-use crate::summary::told_outcomes;
+use crate::summary::outcomes_of;
 use crate::{FlipGroup, Review, ReviewPair, ReviewRun};
 use actcheck_base::names;
 
@@ -92,7 +92,7 @@ fn pair_of(pair: &ReviewPair) -> Value {
 
 fn run_of(run: &ReviewRun) -> Value {
     let detail = &run.detail;
-    let judged = told_outcomes(detail).map(|(step, action, judgement)| {
+    let judged = outcomes_of(detail).map(|(step, action, judgement)| {
         json!({
             "step": step, "action": action, "property": names::local(&judgement.property),
             "outcome": judgement.outcome.word(), "margin": judgement.margin, "witness": judgement.witness,

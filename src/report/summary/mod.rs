@@ -42,6 +42,6 @@ pub use relations::RelationsSummary;
 pub use remarks::{Oddity, Remark};
 pub use repeated::RepeatedProperty;
 pub use review::{Review, ReviewPair, ReviewRun};
-pub(crate) use review::{failures_of, told_outcomes};
+pub(crate) use review::{failures_of, outcomes_of};
 pub use shrunk::{PassingValue, ShrunkChoice, ShrunkSummary};
 pub use weighted::{GuidedSearch, WeightedLine};

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::summary::compared_name;
-use crate::{CompareSummary, Divergence, FlipGroup};
+use crate::{CompareSummary, Divergence, FlipGroup, SharedEvent};
 use actcheck_analysis::Answer;
 use actcheck_base::{Judgement, Outcome, names};
 use actcheck_history::RunDetail;
@@ -42,26 +42,32 @@ impl Divergence {
     /// Returns the moment in a sentence.
     pub fn sentence(&self) -> String {
         let phase = match self.phases.each_ref().map(Option::as_deref) {
-            [Some(first), Some(second)] if first == second => format!(" (`{first}`)"),
-            [Some(first), Some(second)] => format!(" (`{first}` in A, `{second}` in B)"),
-            [Some(first), None] => format!(" (`{first}` in A; B has ended)"),
-            [None, Some(second)] => format!(" (`{second}` in B; A has ended)"),
+            [Some(first), Some(second)] if first == second => format!(" ({first})"),
+            [Some(first), Some(second)] => format!(" ({first} in A, {second} in B)"),
+            [Some(first), None] => format!(" ({first} in A; B has ended)"),
+            [None, Some(second)] => format!(" ({second} in B; A has ended)"),
             [None, None] => String::new(),
         };
-        let later = self.gripper.and_then(|(secs, by)| {
+        let event = |words: &str, moment: &Option<SharedEvent>| {
+            let moment = moment.as_ref()?;
+            let [a, b] = moment.secs;
+            let gripper = moved(moment.gripper_m)?;
             Some(format!(
-                "; {:.1} s later, B's gripper is {}",
-                secs - self.secs,
-                moved(by)?
+                "; when it {words} (at {a:.1} s in A, {b:.1} s in B), B's gripper is {gripper}"
             ))
-        });
+        };
         format!(
-            "both runs are the same until {:.1} s{phase}{}",
+            "both runs are the same until {:.1} s{phase}{}{}",
             self.secs,
-            later.unwrap_or_default()
+            event(TOUCHES, &self.touch).unwrap_or_default(),
+            event(RELEASES, &self.release).unwrap_or_default()
         )
     }
 }
+
+/// The events in words.
+const TOUCHES: &str = "first touches the target";
+const RELEASES: &str = "lets go of the target";
 
 /// Where a point is relative to another; `None` if it is near. Frame: world.
 fn moved(by: [f64; 3]) -> Option<String> {
@@ -120,33 +126,46 @@ impl Review<'_> {
     /// Where the pairs of a group begin to differ, in a sentence; `None` if none of them does.
     pub fn origin(&self, group: &FlipGroup<'_>) -> Option<String> {
         let mut phases: BTreeMap<&str, usize> = BTreeMap::new();
-        let (mut n_pairs, mut rises) = (0, Vec::new());
+        let mut found: Vec<&Divergence> = Vec::new();
         for pair in self.of_group(group) {
-            let Some(found) = &pair.divergence else {
+            let Some(of_pair) = &pair.divergence else {
                 continue;
             };
-            n_pairs += 1;
-            if let Some(phase) = found.phases.iter().flatten().next() {
+            found.push(of_pair);
+            if let Some(phase) = of_pair.phases.iter().flatten().next() {
                 *phases.entry(phase).or_default() += 1;
             }
-            rises.extend(found.gripper.map(|(_, by)| by[2]));
         }
         let (phase, count) = phases.into_iter().max_by_key(|(_, count)| *count)?;
-        rises.sort_by(f64::total_cmp);
-        let rise = rises
-            .get(rises.len() / 2)
-            .and_then(|rise| moved([0.0, 0.0, *rise]));
-        let later = rise.map_or_else(String::new, |rise| {
-            format!("; then B's gripper is {rise} (median, 1 s later)")
+        let events: [(&str, OfPair); 2] = [
+            (TOUCHES, |found| found.touch.as_ref()),
+            (RELEASES, |found| found.release.as_ref()),
+        ];
+        let of_events = events.into_iter().filter_map(|(words, event)| {
+            let mut rises: Vec<f64> = found
+                .iter()
+                .filter_map(|found| Some(event(found)?.gripper_m[2]))
+                .collect();
+            rises.sort_by(f64::total_cmp);
+            let rise = moved([0.0, 0.0, *rises.get(rises.len() / 2)?])?;
+            Some(format!(
+                "; when it {words}, B's gripper is {rise} (median of {})",
+                rises.len()
+            ))
         });
         Some(format!(
-            "in {count} of {n_pairs} pairs, both runs are the same until `{phase}`{later}"
+            "in {count} of {} pairs, both runs are the same until {phase}{}",
+            found.len(),
+            of_events.collect::<String>()
         ))
     }
 }
 
+/// An event of two runs.
+type OfPair = fn(&Divergence) -> Option<&SharedEvent>;
+
 /// The outcomes of a run, each with the step and the name of its action.
-pub(crate) fn told_outcomes(run: &RunDetail) -> impl Iterator<Item = (u32, &str, &Judgement)> {
+pub(crate) fn outcomes_of(run: &RunDetail) -> impl Iterator<Item = (u32, &str, &Judgement)> {
     run.actions.iter().flat_map(|action| {
         let judged = action.judgements.iter();
         judged.map(|judgement| (action.step, names::local(&action.action), judgement))
@@ -155,7 +174,7 @@ pub(crate) fn told_outcomes(run: &RunDetail) -> impl Iterator<Item = (u32, &str,
 
 /// The failures of a run, each with its witness.
 pub(crate) fn failures_of(run: &RunDetail) -> impl Iterator<Item = (&str, &Judgement)> {
-    told_outcomes(run)
+    outcomes_of(run)
         .filter(|(.., judgement)| judgement.outcome == Outcome::Failed)
         .map(|(_, action, judgement)| (action, judgement))
 }

@@ -52,7 +52,7 @@ function sideLine(side, name) {
 function changes(compared) {
   const short = (digest) => digest === null ? "absent" : String(digest).replace(/[0-9a-f]{16,}/g, (digits) => digits.slice(0, 8));
   const lines = [["−", compared.config_only_in_a], ["+", compared.config_only_in_b]];
-  return make("section", { class: "card changes" }, make("h2", {}, "What differs"),
+  return make("section", { class: "card changes" }, make("h2", {}, "Differences"),
     compared.changes.length === 0 && make("p", {}, "Nothing: program, skill, configuration, models, ontology and rules are the same."),
     make("ul", {}, compared.changes.map((change) => make("li", {}, make("b", {}, change.kind), ` ${change.name} `, make("span", { class: "faint" }, `${short(change.a)} → ${short(change.b)}`)))),
     lines.some(([, texts]) => texts.length > 0) && make("div", { class: "diff", tabindex: "0", role: "group", "aria-label": "Lines of the configuration that differ" },
@@ -81,7 +81,7 @@ function pairLink(pair, current) {
   return make("a", { href: addressOf([pair.a, pair.b]), "aria-current": pair === current ? "true" : null }, words);
 }
 
-/** A run beside its replay: what failed, what its program printed. */
+/** The text beside a replay: failures, and the output of the program. */
 function sideOf(run, name, other) {
   const outcomeThere = (judged) => other.judged.find((one) => one.step === judged.step && one.property === judged.property)?.outcome;
   const flipped = run.judged.filter((judged) => outcomeThere(judged) !== judged.outcome);
@@ -136,12 +136,25 @@ class Pair {
     }
     this.seconds = Math.max(0, ...this.players.map((one) => one.seconds));
     this.slider.max = this.seconds;
-    const first = replays.flatMap((replay) => replay?.actions ?? []).flatMap((action) => action.judged ?? []).map((judged) => judged.stated).find((secs) => typeof secs === "number");
-    const secs = first ?? this.pair.known.differ?.secs ?? 0;
+    const secs = this.deciding(replays) ?? this.pair.known.differ?.secs ?? 0;
     this.players.forEach(({ made }) => { this.busy = true; made.begin(secs); this.busy = false; });
     this.show(secs);
     this.element.dataset.ready = "true";
     return undefined;
+  }
+
+  /** The moment of the first failure that only one of both runs has. */
+  deciding(replays) {
+    const { runs } = this.pair.known;
+    for (const [side, replay] of replays.entries()) {
+      const other = runs[1 - side].judged;
+      for (const action of replay?.actions ?? []) {
+        const there = (judged) => other.find((one) => one.step === action.step && one.property === local(judged.property))?.outcome;
+        const flipped = action.judged.find((judged) => judged.outcome === "failed" && there(judged) !== "failed");
+        if (flipped) return flipped.pressed && replay.pressed ? replay.pressed.secs[0] : flipped.stated;
+      }
+    }
+    return null;
   }
 
   /** Moves the other run along if one was moved by its own timeline. */
@@ -199,7 +212,7 @@ async function reviewMain() {
     fill(element,
       make("h1", {}, review.headline, " ", badge(ANSWERS[compared.answer], SAID[compared.answer] ?? compared.answer)),
       make("dl", { class: "facts" }, sideLine(compared.a, "A"), sideLine(compared.b, "B")),
-      make("div", { class: "first" }, lists, changes(compared)), knownIssues(compared), place, rateTable(compared));
+      make("div", { class: "first" }, rateTable(compared), changes(compared)), knownIssues(compared), lists, place);
     const pairs = review.groups.flatMap((group) => group.pairs).filter((pair) => pair.known);
     let shown = null;
     const go = (chosen) => {
