@@ -39,7 +39,7 @@
 //! | [`history`] | the run store: transactions, queries, traces | oxigraph (store), spargebra (parser) |
 //! | [`campaign`] | runs the stages of a campaign; the only crate that calls many stages | rayon |
 //! | [`analysis`] | history to tables and patterns: rates with intervals, failure modes, comparison of campaigns, failure conditions | polars, statrs |
-//! | [`report`] | verdicts and tables as text, JSON and HTML, and in the formats of other tools; runs as pictures and in 3D | rerun (feature `rerun`) |
+//! | [`report`] | verdicts and tables as text, JSON and HTML, and in the formats of other tools; runs as pictures, in 3D and as bags of ROS 2 | mcap, rerun (feature `rerun`) |
 //! | [`serve`] | a history over HTTP: SPARQL endpoint, query page, report | hyper, tokio |
 //! | [`remote`] | HTTP client: sends statements to stores of others, and asks there | ureq, rustls (feature `https`) |
 //! | [`cli`] | arguments, exit codes, progress; the one place that prints errors | clap, clap_complete, clap_mangen |

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use actcheck::analysis::{
-    Compared, ComparedRun, Comparison, PairedTable, Sampling, compare, compared_runs,
+    Answer, Compared, ComparedRun, Comparison, PairedTable, Sampling, compare, compared_runs,
 };
 use actcheck::base::{Outcome, names};
 use actcheck::data::Choices;
@@ -504,9 +504,20 @@ fn a_campaign_is_newer_than_its_regressions() {
 }
 
 #[test]
-fn a_campaign_compared_with_itself_shows_no_difference() {
-    let runs = flipped(&mut Choices::random(31, 0), 20, &[0.5, 0.5]);
-    let Comparison { pairs, lines, .. } = compare(&runs, &runs, Sampling::Fixed);
+fn a_campaign_compared_with_itself_is_the_same() {
+    let mut runs = flipped(&mut Choices::random(31, 0), 20, &[0.5, 0.5]);
+    // Without known states, equal outcomes decide nothing.
+    let open = compare(&runs, &runs, Sampling::Fixed).answer(LEVEL, 0.05);
+    assert!(matches!(open, Answer::Underpowered { .. }), "{open:?}");
+    runs.iter_mut().for_each(|run| run.states = Some(1));
+    let found = compare(&runs, &runs, Sampling::Fixed);
+    assert_eq!(found.answer(LEVEL, 0.05), Answer::Same);
+    let fewer = compare(&runs, &runs[1..], Sampling::Fixed);
+    assert_ne!(fewer.answer(LEVEL, 0.05), Answer::Same);
+    let mut others = runs.clone();
+    others[3].states = Some(2);
+    assert!(!compare(&runs, &others, Sampling::Fixed).is_same);
+    let Comparison { pairs, lines, .. } = found;
     assert_eq!(
         (pairs, lines.len(), &lines[0].of),
         (20, 3, &Compared::WholeRun)

@@ -314,13 +314,18 @@ fn the_github_workflow_reports_and_accepts_an_equal_change() {
     .concat();
     let checkout = repository();
     let gate = before_the_gate(&checkout, "github.yml", &environment);
-    for file in ["report.html", "junit.xml", "summary.md"] {
+    checkout.run(&gate, &environment);
+    for file in ["report.html", "junit.xml", "compare.html"] {
         assert!(
             !read(&checkout.path().join(file)).is_empty(),
             "{file} is empty"
         );
     }
-    checkout.run(&gate, &environment);
+    let summary = read(&checkout.path().join("summary.md"));
+    assert!(
+        summary.starts_with("## actcheck: A and B are the same"),
+        "{summary}"
+    );
 }
 
 #[test]
@@ -352,4 +357,14 @@ fn the_gitlab_pipeline_reports_and_refuses_a_worse_change() {
         stdout(&output),
         stderr(&output)
     );
+    let review = read(&checkout.path().join("compare.md"));
+    assert!(
+        review.starts_with("## actcheck: B is worse than A"),
+        "{review}"
+    );
+    assert!(
+        review.contains("moved\\_object.rls") && review.contains("fail in B only"),
+        "{review}"
+    );
+    assert!(!read(&checkout.path().join("compare.html")).is_empty());
 }

@@ -65,7 +65,7 @@ const FENCES: [(&str, &[&str]); 35] = [
         &["geometry", "robot", "world", "scenario", "episodes"],
     ),
     ("png", &["geometry"]),
-    ("mcap", &["episodes"]),
+    ("mcap", &["episodes", "report"]),
     ("prost", &["episodes"]),
     ("pyo3", &["judge"]),
     ("urdf-rs", &["config"]),

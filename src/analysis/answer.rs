@@ -10,6 +10,8 @@ pub enum Answer {
     Worse,
     /// The second is better.
     Better,
+    /// All runs are the same on both sides, with the same states and outcomes.
+    Same,
     /// The rates differ by less than the margin.
     NoDifference,
     /// Too few scenes to decide.
@@ -21,11 +23,12 @@ pub enum Answer {
 }
 
 impl Answer {
-    /// Its name: `worse`, `better`, `no difference` or `underpowered`.
+    /// Its name: `worse`, `better`, `same`, `no difference` or `underpowered`.
     pub fn word(self) -> &'static str {
         match self {
             Self::Worse => "worse",
             Self::Better => "better",
+            Self::Same => "same",
             Self::NoDifference => "no difference",
             Self::Underpowered { .. } => "underpowered",
         }
@@ -40,6 +43,9 @@ impl Comparison {
     /// probability of a false alarm over all lines. `margin`: rates that differ by less count as
     /// equal, between 0 and 1.
     pub fn answer_of(&self, line: &ComparedLine, level: f64, margin: f64) -> Answer {
+        if self.is_same {
+            return Answer::Same;
+        }
         decided(line.difference, line.two_sided_adjusted, level, margin).unwrap_or_else(|| {
             Answer::Underpowered {
                 scenes: self.scenes_to_decide(line, level, margin),
@@ -50,6 +56,9 @@ impl Comparison {
     /// Returns the answer over all lines: worse if one is worse, else better if one is better, else
     /// underpowered if one is. See [`Comparison::answer_of`].
     pub fn answer(&self, level: f64, margin: f64) -> Answer {
+        if self.is_same {
+            return Answer::Same;
+        }
         let answers: Vec<Answer> = self
             .lines
             .iter()
@@ -185,6 +194,7 @@ mod tests {
             judged_alone: [Vec::new(), Vec::new()],
             lines: lines.collect(),
             sampling: Sampling::Fixed,
+            is_same: false,
         };
         let adjusted = holm(
             &made

@@ -144,7 +144,7 @@ pub fn like_by_rates(
         from_second.get(of) == Some(&Answer::Better)
             || matches!(
                 from_first.get(of),
-                Some(Answer::NoDifference | Answer::Better)
+                Some(Answer::Same | Answer::NoDifference | Answer::Better)
             )
     };
     if !wanted.is_empty() && wanted.iter().all(is_like_first) {

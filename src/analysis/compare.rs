@@ -35,6 +35,8 @@ pub struct ComparedRun {
     pub place: (u64, u64),
     /// Digest of the scene.
     pub scene: SceneDigest,
+    /// Digest over every state; `None` if there is none.
+    pub states: Option<u128>,
     /// Most runs have the same outcomes as many others, and share them.
     outcomes: Arc<BTreeMap<Compared, Outcome>>,
 }
@@ -87,6 +89,8 @@ pub struct Comparison {
     pub lines: Vec<ComparedLine>,
     /// How the number of scenes was decided: which tests and intervals are valid.
     pub sampling: Sampling,
+    /// Whether both campaigns have the same runs, with the same states and outcomes.
+    pub is_same: bool,
 }
 
 /// Returns the runs of a campaign for a comparison, sorted by place. Runs without a known scene are
@@ -150,6 +154,7 @@ impl ComparedRuns {
             (repetition.scene, repetition.number)
         });
         self.runs.push(ComparedRun {
+            states: u128::from_str_radix(&row.trace_hash, 16).ok(),
             run: row.run,
             place,
             scene,
@@ -276,6 +281,12 @@ pub fn compare(first: &[ComparedRun], second: &[ComparedRun], sampling: Sampling
     let (same, others): (Vec<_>, Vec<_>) = met
         .into_iter()
         .partition(|[a, b]| a.scene.arrangement == b.scene.arrangement);
+    let is_same = others.is_empty()
+        && same.len() == first.len()
+        && same.len() == second.len()
+        && same
+            .iter()
+            .all(|[a, b]| a.states.is_some() && a.states == b.states && a.outcomes == b.outcomes);
     let pairs = scene_pairs(&same);
     let judged = [0, 1].map(|side| {
         pairs
@@ -298,6 +309,7 @@ pub fn compare(first: &[ComparedRun], second: &[ComparedRun], sampling: Sampling
         ],
         lines: lines(&pairs, judged_first.intersection(&judged_second), sampling),
         sampling,
+        is_same,
     }
 }
 

@@ -6,8 +6,8 @@ use crate::environment::stored_campaign;
 use crate::solids;
 use actcheck_base::Diagnostics;
 use actcheck_config::Campaign;
-use actcheck_data::{Appearances, ObjectModel, SeenPart, Shape};
-use actcheck_history::History;
+use actcheck_data::{Appearances, ObjectModel, RobotCore, SeenPart, Shape};
+use actcheck_history::{CampaignRecord, History};
 use actcheck_world::{LazySkins, Robot, Skins};
 
 /// Most triangles of a body: more than a picture shows.
@@ -30,16 +30,9 @@ pub fn appearances(
     found: &mut Diagnostics,
 ) -> Result<Appearances, Diagnostics> {
     let record = history.campaign(campaign)?;
-    let Ok(mut campaign) = stored_campaign(history, &record) else {
+    let Some(mut campaign) = with_same_robot(history, &record) else {
         return Ok(Appearances::default());
     };
-    let robot = (
-        campaign.robot.core.name.clone(),
-        campaign.robot.core.digest.clone(),
-    );
-    if !record.models.contains(&robot) {
-        return Ok(Appearances::default());
-    }
     let mut all = Appearances::default();
     for name in campaign.used_models() {
         let digest = campaign.models.get(&name).map(|model| &model.digest);
@@ -89,6 +82,27 @@ pub(crate) fn skins(campaign: &Campaign, robot: &Robot) -> LazySkins {
         };
         Skins::new(&all, models.iter().map(Arc::as_ref), &robot)
     }))
+}
+
+/// Reads the robot of a campaign; `None` if the campaign can't be prepared any more, has another robot
+/// now, or was imported.
+///
+/// This starts the program that expands the robot's file, if there is one.
+///
+/// # Errors
+/// `H014` if the history has no such campaign.
+pub fn stored_robot(history: &History, campaign: &str) -> Result<Option<RobotCore>, Diagnostics> {
+    let record = history.campaign(campaign)?;
+    Ok(with_same_robot(history, &record).map(|campaign| campaign.robot.core.clone()))
+}
+
+/// Reads the configuration of a campaign; `None` if it can't be read any more, or names another robot
+/// now.
+fn with_same_robot(history: &History, record: &CampaignRecord) -> Option<Campaign> {
+    let campaign = stored_campaign(history, record).ok()?;
+    let core = &campaign.robot.core;
+    let robot = (core.name.clone(), core.digest.clone());
+    record.models.contains(&robot).then_some(campaign)
 }
 
 /// Limits the triangles of each body and of all together.

@@ -1,6 +1,6 @@
 //! Prepares and checks everything that a campaign needs before its first run.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::requirement::Requirement;
 use crate::rule_set::recorded_rules;
 use crate::{plausible, solids};
 use actcheck_actions as actions;
-use actcheck_base::{Diagnostic, Diagnostics, Source, program_digest};
+use actcheck_base::{Diagnostic, Diagnostics, Files, Source, program_digest};
 use actcheck_config as config;
 use actcheck_config::{Campaign, Launcher, Overrides, Starts, Step};
 use actcheck_data::{Choice, ChoiceName, RobotView};
@@ -326,6 +326,23 @@ impl Env {
         }
     }
 
+    /// Digest of the inputs that a revision of a project changes: the configuration, the program that
+    /// performs actions, and the rules that are not shipped ones. Campaigns of revisions in different
+    /// histories have different ids by it.
+    pub fn revision(&self) -> String {
+        let config = actcheck_base::digest_of(&self.campaign.source.text);
+        let rules = self.ontology.properties.values().map(|known| &known.rule);
+        let own: BTreeSet<&str> = rules
+            .filter(|rule| !is_shipped(&rule.source))
+            .map(|rule| rule.digest.as_str())
+            .collect();
+        let skill = self.skill();
+        let others = skill.iter().map(|skill| skill.digest.as_str()).chain(own);
+        others.fold(config, |all, digest| {
+            actcheck_base::digest_of(&format!("{all} {digest}"))
+        })
+    }
+
     /// The program that performs actions, for the record.
     fn skill(&self) -> Option<SkillRecord> {
         match &self.campaign.launcher {
@@ -416,6 +433,18 @@ pub(super) fn recorded_overrides(history: &History, record: &CampaignRecord) -> 
         history: Some(history.dir().to_path_buf()),
         launcher: None,
     }
+}
+
+/// Whether a rule file is a copy of a shipped one.
+fn is_shipped(rule: &Source) -> bool {
+    let name = Path::new(&*rule.name).file_name();
+    let mut shipped = Files::all_shipped(Path::new("rules")).into_iter();
+    shipped.any(|path| {
+        path.file_name() == name
+            && Files::Shipped
+                .read(&path)
+                .is_ok_and(|known| known.text == rule.text)
+    })
 }
 
 /// Drops the warnings O017 about the rule files that `[scene] require` and `[relations]` name.

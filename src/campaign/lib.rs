@@ -54,7 +54,7 @@ mod workers;
 pub use actcheck_protocol::LineSink;
 pub use actcheck_world::{EngineContact, EngineState, MovedObject, Setpoint};
 pub use actcheck_world::{FingerJoint, Proposal, UnknownHand};
-pub use appearance::appearances;
+pub use appearance::{appearances, stored_robot};
 pub use budget::ExhaustedBudget;
 pub use changes::{ChangeKind, InputChange, changes, made_by_other_physics, other_physics};
 pub use cross_check::{judge_played, mapping_of, rules_of};

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use crate::{output, trust};
 use actcheck_base::Diagnostics;
-use actcheck_campaign::{Env, appearances};
-use actcheck_data::Appearances;
+use actcheck_campaign::{Env, appearances, stored_robot};
+use actcheck_data::{Appearances, RobotCore};
 use actcheck_history::History;
 
 /// Reads the appearance of bodies. Campaigns of the same configuration share it.
@@ -38,11 +38,7 @@ impl<'a> AppearanceReader<'a> {
         if let Some(known) = self.known.get(&key) {
             return Ok(Arc::clone(known));
         }
-        let starts = Env::starts_from_history(self.history, campaign);
-        // An imported campaign has no robot of ours.
-        let may_read =
-            starts.is_ok_and(|starts| self.is_trusted || trust::expands_none(campaign, &starts));
-        let read = if may_read {
+        let read = if self.may_read(campaign) {
             let mut found = Diagnostics::new();
             let read = appearances(self.history, campaign, &mut found)?;
             if !found.is_empty() {
@@ -55,5 +51,22 @@ impl<'a> AppearanceReader<'a> {
         let read = Arc::new(read);
         self.known.insert(key, Arc::clone(&read));
         Ok(read)
+    }
+
+    /// Returns the robot of a campaign; `None` if that can't be read any more.
+    ///
+    /// # Errors
+    /// `H014` if the history has no such campaign.
+    pub(super) fn robot(&self, campaign: &str) -> Result<Option<RobotCore>, Diagnostics> {
+        match self.may_read(campaign) {
+            true => stored_robot(self.history, campaign),
+            false => Ok(None),
+        }
+    }
+
+    /// Whether the robot's file may be read. An imported campaign has no robot of ours.
+    fn may_read(&self, campaign: &str) -> bool {
+        let starts = Env::starts_from_history(self.history, campaign);
+        starts.is_ok_and(|starts| self.is_trusted || trust::expands_none(campaign, &starts))
     }
 }

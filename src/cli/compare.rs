@@ -6,14 +6,16 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::chosen::{engine_name, sampling};
-use crate::options::{Format, HistoryArgs, level};
-use crate::{history_dir, output};
+use crate::options::{Format, HistoryArgs, level, megabytes};
+use crate::trust::TrustArgs;
+use crate::{history_dir, known_issues, output, review};
 use actcheck_analysis::{ComparedRun, ComparedRuns, Comparison, Sampling, compare as compare_runs};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign::changes;
 use actcheck_history::{CampaignRecord, History, Judgements, RunFilter, Wish};
 use actcheck_report::{
-    CompareSummary, ComparedSide, SideChange, compare_json, compare_table, compare_text,
+    CompareSummary, ComparedSide, KnownIssueRuns, SideChange, compare_json, compare_table,
+    compare_text,
 };
 
 /// Suffix of a campaign: use its newest judgements.
@@ -38,7 +40,7 @@ pub struct CompareArgs {
     /// Rates that differ by less count as equal, as a share
     #[arg(long, value_name = "SHARE", value_parser = level, default_value = "0.05")]
     pub margin: f64,
-    /// Exit with the answer: 0 no difference, 1 worse, 3 better, 4 underpowered (too few scenes to
+    /// Exit with the answer: 0 same or no difference, 1 worse, 3 better, 4 underpowered (too few scenes to
     /// decide); at the level of --fail-if-worse, or 0.05
     #[arg(long)]
     pub decide: bool,
@@ -49,9 +51,26 @@ pub struct CompareArgs {
     /// Compare also if the campaigns have different physics engines
     #[arg(long)]
     pub across_engines: bool,
+    /// Accept the failure modes that this file names until its dates (TOML): their scenes are shown
+    /// apart and not compared
+    #[arg(long, value_name = "FILE.toml")]
+    pub known_issues: Option<PathBuf>,
+    /// Write the comparison as a page to review a change: properties that are better or worse, and the
+    /// scenes that flipped, with both replays side by side
+    #[arg(long, value_name = "FILE.html")]
+    pub html: Option<PathBuf>,
+    /// Write the comparison in Markdown, for the summary of a job; `-` prints it instead of the text
+    #[arg(long, value_name = "FILE.md")]
+    pub markdown: Option<PathBuf>,
+    /// Maximum size of the replays in the page
+    #[arg(long, value_name = "MB", default_value_t = 10.0, value_parser = megabytes, requires = "html")]
+    pub replay_mb: f64,
     /// The folder of the history for an ID without DIR.
     #[command(flatten)]
     pub history: HistoryArgs,
+    /// The consent to start programs.
+    #[command(flatten)]
+    pub trust: TrustArgs,
     /// How it is printed (csv: one line for each property; json: everything)
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub format: Format,
@@ -60,8 +79,8 @@ pub struct CompareArgs {
 /// Compares two campaigns and prints the result. Returns the exit code.
 pub fn compare(args: &CompareArgs) -> Result<u8, Diagnostics> {
     let mut histories = Histories::default();
-    let first = Side::read(&args.first, &args.history, &mut histories)?;
-    let second = Side::read(&args.second, &args.history, &mut histories)?;
+    let mut first = Side::read(&args.first, &args.history, &mut histories)?;
+    let mut second = Side::read(&args.second, &args.history, &mut histories)?;
     let engines = [&first, &second].map(|side| engine_name(side.record.imported_from.as_deref()));
     if engines[0] != engines[1] && !args.across_engines {
         let message = format!(
@@ -78,8 +97,15 @@ pub fn compare(args: &CompareArgs) -> Result<u8, Diagnostics> {
         Sampling::Fixed
     };
     let comparison_sampling = first.sampling.and(second.sampling).and(asked);
+    let known = match &args.known_issues {
+        Some(file) => known_issues::set_apart(file, [&mut first, &mut second])?,
+        None => Vec::new(),
+    };
     let comparison = compare_runs(&first.runs, &second.runs, comparison_sampling);
-    if comparison.pairs == 0 {
+    let excuses = |issue: &KnownIssueRuns| {
+        !issue.is_expired && issue.runs.iter().any(|runs| !runs.is_empty())
+    };
+    if comparison.pairs == 0 && !known.iter().any(excuses) {
         return Err(nothing_shared(&first, &second, &comparison).into());
     }
     let summary = CompareSummary {
@@ -91,12 +117,14 @@ pub fn compare(args: &CompareArgs) -> Result<u8, Diagnostics> {
         decide: args.decide,
         sequential: args.sequential,
         without_contested: without_contested(&first, &second, comparison_sampling),
+        known,
     };
-    output::print(&match args.format {
+    let printed = review::write(args, &summary, [&first, &second], &histories)?;
+    output::print(&printed.unwrap_or_else(|| match args.format {
         Format::Text => compare_text(&summary, output::page()),
         Format::Csv => compare_table(&summary).render(args.format.into(), output::page()),
         Format::Json => format!("{:#}\n", compare_json(&summary)),
-    });
+    }));
     Ok(summary.exit_code())
 }
 
@@ -133,7 +161,11 @@ pub(super) struct Histories {
 }
 
 impl Histories {
-    fn get(&mut self, dir: Option<&Path>, default: &HistoryArgs) -> Result<&History, Diagnostics> {
+    fn get(
+        &mut self,
+        dir: Option<&Path>,
+        default: &HistoryArgs,
+    ) -> Result<(&History, PathBuf), Diagnostics> {
         let dir = match dir {
             Some(dir) => dir.to_path_buf(),
             None => history_dir::folder(default)?,
@@ -142,7 +174,12 @@ impl Histories {
         if !self.open.contains_key(&key) {
             self.open.insert(key.clone(), History::open_to_read(&dir)?);
         }
-        Ok(&self.open[&key])
+        Ok((&self.open[&key], key))
+    }
+
+    /// The history of a side.
+    pub(super) fn of(&self, side: &Side) -> Option<&History> {
+        self.open.get(&side.dir)
     }
 }
 
@@ -176,7 +213,9 @@ impl<'a> Name<'a> {
 
 /// One side, read from its history.
 pub(super) struct Side {
-    name: String,
+    pub(super) name: String,
+    /// The folder of its history, by which the open one is found.
+    dir: PathBuf,
     pub(super) record: CampaignRecord,
     pub(super) runs: Vec<ComparedRun>,
     /// Ids of the runs whose verdict another engine contests.
@@ -198,7 +237,7 @@ impl Side {
         histories: &mut Histories,
     ) -> Result<Self, Diagnostics> {
         let name = Name::read(text);
-        let history = histories.get(name.dir, default)?;
+        let (history, dir) = histories.get(name.dir, default)?;
         let id = match name.campaign {
             Some(id) => id.to_owned(),
             None => newest(history)?,
@@ -229,6 +268,7 @@ impl Side {
         let count = collected.len() as u64;
         Ok(Self {
             name: text.to_owned(),
+            dir,
             record,
             runs: collected.sorted(),
             contested: history.contested()?.into_keys().collect(),

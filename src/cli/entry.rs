@@ -14,7 +14,7 @@ use actcheck_base::set_program_digest;
 
 /// Options of `export run` that name a kind of file: `export RUN --mjcf DIR` is short for
 /// `export run RUN --mjcf DIR`.
-const WRITES_A_RUN: [&str; 2] = ["--mjcf", "--setpoints"];
+const WRITES_A_RUN: [&str; 3] = ["--mcap", "--mjcf", "--setpoints"];
 
 /// Adds the kind `run` to an export of a run that does without it.
 fn with_kind_of_export(mut words: Vec<OsString>) -> Vec<OsString> {
@@ -99,6 +99,10 @@ mod tests {
             (
                 "actcheck export k7f3-3 --mjcf d",
                 "actcheck export run k7f3-3 --mjcf d",
+            ),
+            (
+                "actcheck export k7f3-3 --mcap f",
+                "actcheck export run k7f3-3 --mcap f",
             ),
             (
                 "actcheck export --mjcf=d k7f3-3",

@@ -26,7 +26,7 @@ pub enum ExportKind {
     /// inside the project refers to the ontology and models by relative paths; a file elsewhere
     /// omits those that are the same as the shipped ones, so that it runs anywhere.
     #[command(
-        after_help = "Examples:\n  actcheck export run k7f3-3 -o case.toml    (a run id from `actcheck list`; a prefix is enough)\n  actcheck export run @last-failed --regression\n  actcheck export k7f3-3 --mjcf model --setpoints    (for MuJoCo; short for `export run`)"
+        after_help = "Examples:\n  actcheck export run k7f3-3 -o case.toml    (a run id from `actcheck list`; a prefix is enough)\n  actcheck export run @last-failed --regression\n  actcheck export k7f3-3 --mjcf model --setpoints    (for MuJoCo; short for `export run`)\n  actcheck export k7f3-3 --mcap run.mcap    (for Foxglove, RViz and PlotJuggler)"
     )]
     Run(ExportRunArgs),
     /// The outcomes, facts or motion of runs as tables, with a description of their columns

@@ -4,18 +4,20 @@ use std::path::{Path, PathBuf};
 
 use clap::{ArgGroup, Args};
 
+use crate::appearance::AppearanceReader;
 use crate::options::HistoryArgs;
 use crate::trust::TrustArgs;
 use crate::work::quietly;
-use crate::{clock, history_dir, output, output_file, trust};
+use crate::{clock, history_dir, output, output_file, restore, trust};
 use actcheck_base::{Diagnostic, Diagnostics, ShellLine};
 use actcheck_campaign as campaign;
 use actcheck_campaign::{Env, RunContext, StoredCampaign};
 use actcheck_history::{History, RunDetail};
+use actcheck_report::{BagInput, bag};
 
 /// `actcheck export run`
 #[derive(Debug, Args)]
-#[command(group(ArgGroup::new("written").args(["output", "regression", "mjcf"]).required(true)))]
+#[command(group(ArgGroup::new("written").args(["output", "regression", "mjcf", "mcap"]).required(true)))]
 pub struct ExportRunArgs {
     /// Id of the run, or a unique prefix
     pub run: String,
@@ -33,6 +35,10 @@ pub struct ExportRunArgs {
     /// With the robot's setpoints, 60 per second: `setpoints.csv`
     #[arg(long, requires = "mjcf")]
     pub setpoints: bool,
+    /// Write the run as a ROS 2 bag, for Foxglove, RViz and PlotJuggler: poses, joints, shapes,
+    /// contacts, percepts and outcomes over simulated time; `-` prints it
+    #[arg(long, value_name = "FILE.mcap", conflicts_with = "config")]
+    pub mcap: Option<PathBuf>,
     /// Take everything but the choices from this configuration instead of the one in the history
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
@@ -47,6 +53,9 @@ pub struct ExportRunArgs {
 /// Writes a stored run as a configuration.
 pub fn run(args: &ExportRunArgs) -> Result<(), Diagnostics> {
     let history = history_dir::open_to_read(&args.history)?;
+    if let Some(file) = &args.mcap {
+        return export_bag(&history, args, file);
+    }
     let run = history.run(&args.run)?;
     if args.config.is_none() && !args.trust.trust {
         trust::check_expansion(
@@ -89,6 +98,45 @@ pub fn run(args: &ExportRunArgs) -> Result<(), Diagnostics> {
         file.display(),
         run.row.run
     ));
+    Ok(())
+}
+
+/// Writes a run as a ROS 2 bag.
+fn export_bag(history: &History, args: &ExportRunArgs, file: &Path) -> Result<(), Diagnostics> {
+    restore::allow(history, args.trust.trust);
+    let run = history.newest_run(&args.run)?;
+    let trace = history.traces().whole(&run.row.run)?;
+    if trace.snapshots.is_empty() {
+        let message = format!("run {} has no state to export", run.row.run);
+        let help = "it broke before its first action; `actcheck show` shows the reason";
+        return Err(Diagnostic::error("X006", message).help(help).into());
+    }
+    let mut reader = AppearanceReader::new(history, args.trust.trust);
+    let robot = reader.robot(&run.row.campaign)?;
+    let written = bag(&BagInput {
+        run: &run,
+        trace: &trace,
+        robot: robot.as_ref(),
+        appearances: &*reader.of(&run.row.campaign)?,
+    });
+    let bytes = written.map_err(|fault| {
+        Diagnostic::error("X056", format!("a run can't be recorded: {fault}"))
+            .help("report this as a bug in actcheck")
+    })?;
+    if file.as_os_str() == "-" {
+        output::print_bytes(&bytes);
+        return Ok(());
+    }
+    output_file::write(file, &bytes)?;
+    let size = bytes.len() as f64 / 1e6;
+    output::print_prose(&format!(
+        "{} holds run {} ({size:.1} MB)\n",
+        file.display(),
+        run.row.run
+    ));
+    if robot.is_none() {
+        output::print_prose("it lacks /robot_description: the model of its robot is not known\n");
+    }
     Ok(())
 }
 

@@ -92,6 +92,7 @@ impl Gate {
             decide: false,
             sequential: true,
             without_contested: None,
+            known: Vec::new(),
         })
     }
 }

@@ -40,6 +40,7 @@ mod health;
 mod history_dir;
 mod import;
 mod integrity;
+mod known_issues;
 mod labels;
 mod launch;
 mod list;
@@ -76,6 +77,7 @@ mod report_html;
 #[cfg(feature = "rerun")]
 mod report_rrd;
 mod restore;
+mod review;
 mod rules;
 mod run;
 mod run_args;

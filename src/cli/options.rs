@@ -9,6 +9,9 @@ use crate::option_fault::OptionFault;
 use actcheck_config::duration_secs;
 use actcheck_report::TableFormat;
 
+/// Millions, not 2^20, as browsers and file listings count them.
+pub const BYTES_IN_A_MB: f64 = 1e6;
+
 /// The folder of a history.
 #[derive(Debug, Args)]
 pub struct HistoryArgs {
@@ -108,6 +111,17 @@ pub fn memory(text: &str) -> Result<usize, OptionFault> {
             "`{text}` must be an amount of memory above zero, such as 512MiB or 4GiB"
         )
         .into()),
+    }
+}
+
+/// Parses a size of replays. Unit: megabytes.
+///
+/// # Errors
+/// A message if the text is not a number from 0 to 1000.
+pub fn megabytes(text: &str) -> Result<f64, OptionFault> {
+    match text.parse() {
+        Ok(megabytes) if (0.0..=1000.0).contains(&megabytes) => Ok(megabytes),
+        _ => Err("must be a number of megabytes from 0 to 1000, such as 5".into()),
     }
 }
 

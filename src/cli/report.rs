@@ -6,16 +6,13 @@ use clap::Args;
 
 use crate::analyse::{Analysed, Question, analysed};
 use crate::chosen::{ChosenRuns, is_meant};
-use crate::option_fault::OptionFault;
+use crate::options::{BYTES_IN_A_MB, megabytes};
 use crate::report_formats::{self, FormatArgs};
 use crate::trust::TrustArgs;
 use crate::{output, output_file, report_html, restore};
 use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_history::{History, RunDetail};
 use actcheck_report::HTML_COLUMNS;
-
-/// Millions, not 2^20, as browsers and file listings count them.
-const BYTES_IN_A_MB: f64 = 1e6;
 
 /// `actcheck report`
 #[derive(Debug, Args)]
@@ -49,13 +46,6 @@ pub struct ReportArgs {
     /// The consent to start programs.
     #[command(flatten)]
     pub trust: TrustArgs,
-}
-
-fn megabytes(text: &str) -> Result<f64, OptionFault> {
-    match text.parse() {
-        Ok(megabytes) if (0.0..=1000.0).contains(&megabytes) => Ok(megabytes),
-        _ => Err("must be a number of megabytes from 0 to 1000, such as 5".into()),
-    }
 }
 
 impl ReportArgs {

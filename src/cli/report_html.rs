@@ -126,7 +126,8 @@ fn relations(
     Ok(found)
 }
 
-fn words(ontology: &Ontology) -> BTreeMap<String, PropertyWords> {
+/// Names of all properties, by IRI.
+pub(super) fn words(ontology: &Ontology) -> BTreeMap<String, PropertyWords> {
     let told = |property: &actcheck_ontology::Property| PropertyWords {
         label: property.label.clone(),
         comment: property.comment.clone(),

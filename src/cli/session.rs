@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::options::HistoryArgs;
 use crate::run_args::RunArgs;
 use crate::{clock, configurations, history_dir, output, regressions, trust};
-use actcheck_base::{Diagnostic, Diagnostics, digest_of};
+use actcheck_base::{Diagnostic, Diagnostics};
 use actcheck_campaign::{Env, LastFailed, unfinished};
 use actcheck_config as config;
 use actcheck_config::Overrides;
@@ -106,7 +106,7 @@ pub fn open(args: &RunArgs, budget: &Budget, jobs: usize) -> Result<Opened, Diag
     let (id, goes_on) = match resumed {
         Some(campaign) => (campaign.id, true),
         None => (
-            history.next_campaign_id(&digest_of(&env.campaign.source.text), env.campaign.seed)?,
+            history.next_campaign_id(&env.revision(), env.campaign.seed)?,
             false,
         ),
     };
@@ -158,7 +158,7 @@ fn open_failed(args: &RunArgs, budget: &Budget) -> Result<Opened, Diagnostics> {
     if failed.is_empty() {
         return Ok(Opened::NoneFailed(failed.campaign));
     }
-    let id = history.next_campaign_id(&digest_of(&env.campaign.source.text), env.campaign.seed)?;
+    let id = history.next_campaign_id(&env.revision(), env.campaign.seed)?;
     let (kept, regressions) = (Vec::new(), Vec::new());
     Ok(Opened::Campaign(Box::new(Session {
         env,

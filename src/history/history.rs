@@ -269,18 +269,18 @@ impl History {
     }
 
     /// Returns an id for a new campaign: short, unique in this history, and the same for the same
-    /// history, configuration and seed.
+    /// history, revision and seed. `revision` is a digest of the campaign's inputs.
     ///
     /// # Errors
     /// The folder can't be read.
-    pub fn next_campaign_id(&self, config_digest: &str, seed: u64) -> Result<String, Diagnostics> {
+    pub fn next_campaign_id(&self, revision: &str, seed: u64) -> Result<String, Diagnostics> {
         let known: BTreeSet<String> = self.stored.ids()?.into_iter().collect();
         let first = known.len() as u64;
         let free = (first..)
-            .map(|counter| campaign_id(config_digest, seed, counter))
+            .map(|counter| campaign_id(revision, seed, counter))
             .find(|id| !known.contains(id));
         // There are nearly a million short ids; when all are used, a long one follows.
-        Ok(free.unwrap_or_else(|| config_digest.to_owned()))
+        Ok(free.unwrap_or_else(|| revision.to_owned()))
     }
 
     /// Writes a campaign before its first run.

@@ -17,11 +17,11 @@ pub(crate) fn place_of(run: &str) -> Option<(&str, u64)> {
 
 /// Computes a campaign's id: a letter and three letters or digits, without characters that look
 /// alike.
-pub(crate) fn campaign_id(config_digest: &str, seed: u64, counter: u64) -> String {
+pub(crate) fn campaign_id(revision: &str, seed: u64, counter: u64) -> String {
     const LETTERS: &[u8] = b"abcdefghjkmnpqrstvwxyz";
     const ALL: &[u8] = b"abcdefghjkmnpqrstvwxyz23456789";
     let mut digest = Digest::new();
-    digest.update(config_digest.as_bytes());
+    digest.update(revision.as_bytes());
     digest.update(&seed.to_le_bytes());
     digest.update(&counter.to_le_bytes());
     let bytes = digest.finish().into_bytes();

@@ -2,10 +2,14 @@
 //!
 //! Never: decides an outcome, computes a statistic of its own, or writes to a stream.
 
+mod bag;
 mod contacts;
+mod divergence;
+mod faces;
 mod formats;
 mod html;
 mod json;
+mod look;
 #[cfg(test)]
 mod made_up;
 mod moment;
@@ -18,13 +22,15 @@ mod table;
 mod text;
 mod xml;
 
+pub use bag::{BagFault, BagInput, bag};
+pub use divergence::{Divergence, SharedEvent, divergence};
 pub use formats::{
     Attachment, EarlReport, JunitReport, MarkdownReport, Repetitions, allure_common,
-    allure_results, markdown, observation,
+    allure_results, markdown, observation, review_markdown,
 };
 pub use html::{
     Explained, FilmImage, HTML_COLUMNS, HtmlReport, MarginBound, PackedRuns, PropertyWords,
-    ReplayedRun, Replays, film_times, html, html_data, replay_order,
+    ReplayedRun, Replays, ReviewPage, film_times, html, html_data, replay_order, review_html,
 };
 pub use json::{
     campaign_json, case_json, compare_json, engines_json, findings_json, health_json, labels_json,
@@ -37,11 +43,11 @@ pub use picture::{
 pub use recording::{RecordingFault, Recordings};
 pub use summary::{
     ActionSummary, CampaignSummary, CaseSummary, Causes, ChangeReason, CompareSummary,
-    ComparedSide, EndedBy, EngineSummary, FindingsSummary, GuidedSearch, HealthSummary,
-    LabelSummary, LabelledProperty, Oddity, OracleSummary, PassingValue, PropertyLine,
-    PropertyReport, Proportion, RateBounds, RecheckChange, RecheckLine, RecheckSummary,
-    RelationsSummary, Remark, RepeatedProperty, RunSummary, ShrunkChoice, ShrunkSummary,
-    SideChange, WeightedLine,
+    ComparedSide, EndedBy, EngineSummary, FindingsSummary, FlipGroup, GuidedSearch, HealthSummary,
+    KnownIssueRuns, LabelSummary, LabelledProperty, Oddity, OracleSummary, PassingValue,
+    PropertyLine, PropertyReport, Proportion, RateBounds, RecheckChange, RecheckLine,
+    RecheckSummary, RelationsSummary, Remark, RepeatedProperty, Review, ReviewPair, ReviewRun,
+    RunSummary, ShrunkChoice, ShrunkSummary, SideChange, WeightedLine,
 };
 pub use table::{
     Table, TableFormat, TableParts, answer_cells, answer_table, campaign_table, compare_table,

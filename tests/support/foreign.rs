@@ -132,6 +132,14 @@ pub fn mujoco() -> Option<&'static Path> {
     made(python, "MuJoCo and robosuite from PyPI").map(PathBuf::as_path)
 }
 
+/// Python with readers of ROS 2 bags, cached beside the build output. Returns `None` if it can't be
+/// created.
+pub fn bags() -> Option<&'static Path> {
+    static PYTHON: OnceLock<Result<PathBuf, String>> = OnceLock::new();
+    let python = PYTHON.get_or_init(|| environment("bags", "bag.txt"));
+    made(python, "rosbags and mcap-ros2-support from PyPI").map(PathBuf::as_path)
+}
+
 /// A program that prints models as libsdformat reads them, compiled from `tests/foreign` and cached
 /// beside the build output. Returns `None` without a compiler or Debian's `libsdformat-dev`.
 pub fn sdformat() -> Option<&'static Path> {

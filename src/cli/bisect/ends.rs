@@ -67,7 +67,9 @@ impl<'a> Ends<'a> {
                     output::print(&text::ends(versions, &ends.difference(&good, &bad)));
                     return Ok(ends);
                 }
-                Answer::Underpowered { .. } if judge.has_more_scenes() && more > scenes => {
+                Answer::Same | Answer::Underpowered { .. }
+                    if judge.has_more_scenes() && more > scenes =>
+                {
                     scenes = more
                 }
                 other => {

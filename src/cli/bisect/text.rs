@@ -133,7 +133,7 @@ pub fn no_difference(versions: &Versions, answer: Answer, scenes: usize, most: u
                 "{needed} scenes would decide: raise `--most-scenes` (now {most}); or bisect a single case"
             ))
         }
-        Answer::NoDifference | Answer::Worse => {
+        Answer::Same | Answer::NoDifference | Answer::Worse => {
             Diagnostic::error("X064", format!("{both} don't differ in {compared}"))
                 .help("name other ends, another property or other runs")
         }

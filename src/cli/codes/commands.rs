@@ -42,7 +42,7 @@ const CODES_X: &[Code] = &[
     ),
     code(
         "X006",
-        "a run has no state to draw",
+        "a run has no state to draw or to export",
         "it broke before its first action",
         "`actcheck show` shows the reason",
     ),
@@ -264,9 +264,9 @@ const CODES_X: &[Code] = &[
     ),
     code(
         "X056",
-        "a run can't be recorded for Rerun",
+        "a run can't be recorded for Rerun or as a bag",
         "a bug in actcheck",
-        "omit `--rrd`, and report this bug",
+        "omit `--rrd` or `--mcap`, and report this bug",
     ),
     code(
         "X057",
@@ -459,5 +459,11 @@ const CODES_X: &[Code] = &[
         "labels can't be read",
         "the file is not a CSV file with the columns run, property and label, or it names a run or a property that the history lacks",
         "correct the line that the message names; labels are pass or fail",
+    ),
+    code(
+        "X098",
+        "a known issue has expired",
+        "its last day is over, so its failure mode counts again",
+        "repair it, or give it a later date in the file and the reason for that",
     ),
 ];

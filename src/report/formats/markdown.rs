@@ -292,7 +292,7 @@ pub fn plain(text: &str) -> String {
 }
 
 /// Formats an id as inline code.
-fn code(id: &str) -> String {
+pub(super) fn code(id: &str) -> String {
     format!("`{}`", id.replace('`', "'"))
 }
 

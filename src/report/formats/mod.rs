@@ -10,6 +10,7 @@ mod identity;
 mod junit;
 mod markdown;
 mod observation;
+mod review;
 
 pub use allure::{Attachment, allure_common, allure_results};
 pub use earl::EarlReport;
@@ -19,3 +20,5 @@ pub use junit::JunitReport;
 pub(super) use markdown::plain;
 pub use markdown::{MarkdownReport, markdown};
 pub use observation::observation;
+pub(super) use review::flip_words;
+pub use review::review_markdown;

@@ -5,29 +5,48 @@ use base64::engine::general_purpose::STANDARD;
 use serde_json::json;
 use sha2::{Digest as _, Sha256};
 
-use crate::html::HtmlReport;
 use crate::html::pack::packed;
 use crate::html::scripts::{SCRIPT, SHELL, STYLE, THREE};
 use crate::html::summary::summary;
+use crate::html::{HtmlReport, Replays};
 
 /// Returns the report as one page that loads no external resources.
 ///
 /// The same report gives the same page. Its markup has no user text: see the module.
 pub fn html(report: &HtmlReport<'_>) -> String {
-    let script = format!("\"use strict\";\n{}", SCRIPT.join("\n"));
-    let before =
-        data("summary", &summary(report, &report.runs.slots)) + &data("runs", &report.runs.packed);
-    let mut behind = data("forms", &report.replays.forms());
+    let summary = summary(report, &report.runs.slots);
+    assembled(
+        &SCRIPT,
+        &[("summary", &*summary), ("runs", &*report.runs.packed)],
+        report.replays,
+        report.served,
+    )
+}
+
+/// Assembles a page from scripts, the packed data that these read first, and replays. `served`:
+/// whether it asks its server for more.
+pub(super) fn assembled(
+    scripts: &[&str],
+    packed_data: &[(&str, impl AsRef<str>)],
+    replays: &Replays,
+    served: bool,
+) -> String {
+    let script = format!("\"use strict\";\n{}", scripts.join("\n"));
+    let before: String = packed_data
+        .iter()
+        .map(|(id, packed)| data(id, packed.as_ref()))
+        .collect();
+    let mut behind = data("forms", &replays.forms());
     for (name, text) in THREE {
         behind.push_str(&data(name, &packed(text.as_bytes())));
     }
-    for (number, (_, replay)) in report.replays.runs().enumerate() {
+    for (number, (_, replay)) in replays.runs().enumerate() {
         behind.push_str(&data(&format!("replay-{number}"), replay));
     }
     let mut page = String::with_capacity(before.len() + behind.len() + script.len() + 64 * 1024);
     let mut rest = SHELL;
     for (place, filling) in [
-        ("{{policy}}", policy(&script, report.served)),
+        ("{{policy}}", policy(&script, served)),
         ("{{style}}", STYLE.join("\n")),
         ("{{before}}", before),
         ("{{script}}", script),

@@ -2,13 +2,14 @@
 
 /// Style sheets: colours of both themes, the page, outcomes and plots, the list and the run view,
 /// the side of a program.
-pub(super) const STYLE: [&str; 6] = [
+pub(super) const STYLE: [&str; 7] = [
     include_str!("web/colours.css"),
     include_str!("web/page.css"),
     include_str!("web/parts.css"),
     include_str!("web/runs.css"),
     include_str!("web/skill.css"),
     include_str!("web/film.css"),
+    include_str!("web/review.css"),
 ];
 
 /// Scripts. All share one scope; the last one starts the program.
@@ -54,6 +55,35 @@ pub(super) const SCRIPT: [&str; 39] = [
     include_str!("web/main.js"),
 ];
 
+/// Scripts of the page of a comparison, in the same way.
+pub(super) const REVIEW_SCRIPT: [&str; 25] = [
+    include_str!("web/dom.js"),
+    include_str!("web/unpack.js"),
+    include_str!("web/words.js"),
+    include_str!("web/outcomes.js"),
+    include_str!("web/address.js"),
+    include_str!("web/plots.js"),
+    include_str!("web/scatter.js"),
+    include_str!("web/theme.js"),
+    include_str!("web/three.js"),
+    include_str!("web/solids.js"),
+    include_str!("web/course.js"),
+    include_str!("web/closest.js"),
+    include_str!("web/labels.js"),
+    include_str!("web/orbit.js"),
+    include_str!("web/views.js"),
+    include_str!("web/stage.js"),
+    include_str!("web/signals.js"),
+    include_str!("web/quantities.js"),
+    include_str!("web/chooser.js"),
+    include_str!("web/film.js"),
+    include_str!("web/skill.js"),
+    include_str!("web/timeline.js"),
+    include_str!("web/player.js"),
+    include_str!("web/run.js"),
+    include_str!("web/review.js"),
+];
+
 /// Template of the page, with placeholders.
 pub(super) const SHELL: &str = include_str!("web/page.html");
 
@@ -87,7 +117,7 @@ mod tests {
 
     #[test]
     fn scripts_never_parse_text_as_markup() {
-        for script in SCRIPT {
+        for script in SCRIPT.iter().chain(&REVIEW_SCRIPT) {
             for parser in PARSERS {
                 assert!(
                     !script.contains(parser),
@@ -102,7 +132,12 @@ mod tests {
 
     #[test]
     fn the_page_has_no_external_addresses() {
-        for text in SCRIPT.iter().chain(&STYLE).chain([&SHELL]) {
+        for text in SCRIPT
+            .iter()
+            .chain(&REVIEW_SCRIPT)
+            .chain(&STYLE)
+            .chain([&SHELL])
+        {
             let hosts: Vec<&str> = text
                 .split("://")
                 .skip(1)

@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use crate::CompareSummary;
 use crate::summary::compared_parts;
+use crate::{CompareSummary, KnownIssueRuns};
 use actcheck_analysis::{Answer, Compared, ComparedLine, Sampling};
 
 /// Returns the whole comparison as JSON.
@@ -56,6 +56,15 @@ pub fn compare_json(summary: &CompareSummary) -> Value {
         "worse": worse,
         "sequential": summary.sequential,
         "without_contested": without_contested,
+        "known": summary.known.iter().map(known).collect::<Vec<Value>>(),
+    })
+}
+
+fn known(issue: &KnownIssueRuns) -> Value {
+    let [a, b] = &issue.runs;
+    json!({
+        "fails": issue.fails, "reason": issue.reason, "until": issue.until, "expired": issue.is_expired,
+        "a": a, "b": b,
     })
 }
 

@@ -8,8 +8,6 @@
 
 mod events;
 mod footer;
-mod hull;
-mod look;
 mod mesh;
 mod motion;
 mod outcomes;

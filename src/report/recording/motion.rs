@@ -7,7 +7,7 @@ use re_sdk_types::AsComponents;
 use re_sdk_types::archetypes::{Transform3D, ViewCoordinates};
 use re_sdk_types::datatypes::Quaternion;
 
-use crate::recording::look::Look;
+use crate::look::Look;
 use crate::recording::solids::Drawn;
 use crate::recording::stream::{Recording, RecordingFault, place};
 use actcheck_base::names;

@@ -6,9 +6,9 @@ use re_sdk_types::archetypes::{Boxes3D, Capsules3D, Cylinders3D, Ellipsoids3D};
 use re_sdk_types::components::{Color, FillMode};
 use re_sdk_types::datatypes::Quaternion;
 
-use crate::recording::hull::faces;
-use crate::recording::look::Look;
-use crate::recording::mesh::{Mesh, tube};
+use crate::faces::{faces, tube};
+use crate::look::Look;
+use crate::recording::mesh::Mesh;
 use actcheck_data::{BodyState, Part, Pose, Shape};
 
 /// Solids of one kind: sizes, centres and orientations. Frame: body.

@@ -1,5 +1,7 @@
 //! A comparison of two campaigns, with a description of each side.
 
+use std::collections::BTreeMap;
+
 use actcheck_analysis::{Answer, Compared, Comparison};
 use actcheck_base::names;
 
@@ -35,6 +37,32 @@ pub struct SideChange {
     pub second: Option<String>,
 }
 
+/// A known issue, with the runs that it excuses.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct KnownIssueRuns {
+    /// The properties that fail, and no others.
+    pub fails: Vec<String>,
+    /// The reason why it is accepted.
+    pub reason: String,
+    /// The last day on which it is accepted.
+    pub until: String,
+    /// Whether that day is over: its runs count again.
+    pub is_expired: bool,
+    /// Ids of the runs with this failure mode in the first and in the second side.
+    pub runs: [Vec<String>; 2],
+}
+
+/// Scenes in which the same properties flipped.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlipGroup<'a> {
+    /// Subjects that passed in the first side and failed in the second.
+    pub worse: Vec<&'a Compared>,
+    /// Subjects that failed in the first side and passed in the second.
+    pub better: Vec<&'a Compared>,
+    /// Runs of both sides.
+    pub runs: Vec<(String, String)>,
+}
+
 /// Two compared campaigns, ready to print.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CompareSummary {
@@ -54,6 +82,8 @@ pub struct CompareSummary {
     pub sequential: bool,
     /// The comparison without the runs that another engine contests; `None` if there are none.
     pub without_contested: Option<Comparison>,
+    /// The known issues. Scenes with one that is not expired are not compared.
+    pub known: Vec<KnownIssueRuns>,
 }
 
 /// Significance level of the answer if none was given.
@@ -70,13 +100,13 @@ impl CompareSummary {
         self.comparison.answer(self.answer_level(), self.margin)
     }
 
-    /// The code of the answer, if it was asked for: 0 no difference, 1 worse, 3 better, 4
+    /// The code of the answer, if it was asked for: 0 same or no difference, 1 worse, 3 better, 4
     /// underpowered. Otherwise 1 if the second side is significantly worse at the given level, and
     /// 0 if not.
     pub fn exit_code(&self) -> u8 {
         if self.decide {
             return match self.answer() {
-                Answer::NoDifference => 0,
+                Answer::Same | Answer::NoDifference => 0,
                 Answer::Worse => 1,
                 Answer::Better => 3,
                 Answer::Underpowered { .. } => 4,
@@ -86,6 +116,41 @@ impl CompareSummary {
             self.level
                 .is_some_and(|level| !self.comparison.worse_at(level).is_empty()),
         )
+    }
+
+    /// The scenes that flipped, by the properties that did: those that got worse first, then the most
+    /// frequent. Whole runs are named only if no property of theirs flipped.
+    pub fn flip_groups(&self) -> Vec<FlipGroup<'_>> {
+        type Flips<'a> = [Vec<&'a Compared>; 2];
+        let mut pairs: BTreeMap<&(String, String), Flips<'_>> = BTreeMap::new();
+        for line in &self.comparison.lines {
+            for (side, runs) in [&line.worse, &line.better].into_iter().enumerate() {
+                for pair in runs {
+                    pairs.entry(pair).or_default()[side].push(&line.of);
+                }
+            }
+        }
+        let is_property = |of: &&Compared| matches!(of, Compared::Property { .. });
+        let mut groups: BTreeMap<Flips<'_>, Vec<(String, String)>> = BTreeMap::new();
+        for (pair, mut flips) in pairs {
+            if flips.iter().flatten().any(is_property) {
+                flips.iter_mut().for_each(|of| of.retain(is_property));
+            }
+            groups.entry(flips).or_default().push(pair.clone());
+        }
+        let mut found: Vec<FlipGroup<'_>> = groups
+            .into_iter()
+            .map(|([worse, better], mut runs)| {
+                runs.sort_by_key(|(run, _)| (run.len(), run.clone()));
+                FlipGroup {
+                    worse,
+                    better,
+                    runs,
+                }
+            })
+            .collect();
+        found.sort_by_key(|group| (group.worse.is_empty(), std::cmp::Reverse(group.runs.len())));
+        found
     }
 
     /// Configuration lines that only the first side has, and those that only the second has.

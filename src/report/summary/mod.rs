@@ -15,6 +15,7 @@ mod recheck;
 mod relations;
 mod remarks;
 mod repeated;
+mod review;
 mod shrunk;
 mod weighted;
 
@@ -24,7 +25,7 @@ pub use campaign::{
     ActionSummary, CampaignSummary, EndedBy, PropertyLine, Proportion, RateBounds, RunSummary,
 };
 pub use case::CaseSummary;
-pub use compare::{CompareSummary, ComparedSide, SideChange};
+pub use compare::{CompareSummary, ComparedSide, FlipGroup, KnownIssueRuns, SideChange};
 pub(crate) use compare::{compared_name, compared_parts};
 pub use engines::EngineSummary;
 pub use findings::{Causes, FindingsSummary, PropertyReport};
@@ -40,5 +41,7 @@ pub(crate) use relations::RelationSummary;
 pub use relations::RelationsSummary;
 pub use remarks::{Oddity, Remark};
 pub use repeated::RepeatedProperty;
+pub use review::{Review, ReviewPair, ReviewRun};
+pub(crate) use review::{failures_of, outcomes_of};
 pub use shrunk::{PassingValue, ShrunkChoice, ShrunkSummary};
 pub use weighted::{GuidedSearch, WeightedLine};

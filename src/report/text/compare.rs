@@ -22,6 +22,7 @@ pub fn compare_text(summary: &CompareSummary, page: Page) -> String {
     changes(&mut out, summary);
     out.push('\n');
     lines(&mut out, summary, page);
+    known_issues(&mut out, summary);
     without_contested(&mut out, summary);
     flips(&mut out, summary);
     left_out(&mut out, summary);
@@ -187,6 +188,24 @@ fn sequential(summary: &CompareSummary, lines: usize) -> String {
     )
 }
 
+/// The known issues, which are not compared until their date.
+fn known_issues(out: &mut String, summary: &CompareSummary) {
+    for issue in &summary.known {
+        let [a, b] = issue.runs.each_ref().map(Vec::len);
+        let until = &issue.until;
+        let counts = match issue.is_expired {
+            true => format!("the date {until} is over, so their scenes count"),
+            false => format!("until {until}, their scenes do not count"),
+        };
+        let _ = writeln!(
+            out,
+            "\nknown issue: {} fails in {a} runs of A and {b} of B ({}); {counts}",
+            issue.fails.join(" + "),
+            issue.reason
+        );
+    }
+}
+
 /// The rates without the runs that another engine contests.
 fn without_contested(out: &mut String, summary: &CompareSummary) {
     let Some(found) = &summary.without_contested else {
@@ -290,6 +309,14 @@ fn alone(out: &mut String, summary: &CompareSummary) {
 /// Names the lines by their answers, and how many scenes would decide.
 fn answers(out: &mut String, summary: &CompareSummary) {
     let (level, margin) = (summary.answer_level(), summary.margin);
+    if summary.comparison.is_same {
+        let runs = summary.sides[0].runs;
+        let _ = writeln!(
+            out,
+            "\nanswer: same: all {runs} runs have the same states and outcomes in A and B"
+        );
+        return;
+    }
     let _ = writeln!(
         out,
         "\nB is … than A (at the level {level}; rates within {} points count as equal)",

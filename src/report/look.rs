@@ -14,6 +14,7 @@ pub(super) struct Look {
 
 impl Look {
     /// A link of the robot.
+    #[cfg(feature = "rerun")]
     pub const ROBOT: Self = Self::filled(0x86a5_c6ff);
     /// A perceived object.
     pub const PERCEIVED: Self = Self {
@@ -35,7 +36,7 @@ impl Look {
             },
             Some(Role::Target) => Self::filled(0x2f7f_e0ff),
             Some(Role::Obstacle) => Self::filled(0xd08a_2eff),
-            Some(Role::Platform) => Self::filled(0xd9c2_9aff),
+            Some(Role::Platform | Role::Part) => Self::filled(0xd9c2_9aff),
             Some(Role::Other | Role::PlaceOther) => Self::filled(0xaab3_bdff),
             None if body.is_some_and(|body| body.fixed) => Self::filled(0xd9c2_9aff),
             None => Self::filled(0xaab3_bdff),

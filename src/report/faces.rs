@@ -1,4 +1,6 @@
-//! Computes the faces of a convex solid from its corners.
+//! Computes the faces of convex solids and of tubes.
+
+use std::f64::consts::TAU;
 
 use nalgebra::{Point3, Vector3};
 
@@ -8,6 +10,8 @@ use actcheck_data::convex_hull;
 const FLAT_M: f64 = 1e-6;
 /// Maximum number of corners used. Traces have at most 26 per solid.
 const MOST_CORNERS: usize = 64;
+/// Number of sides that approximate a circle.
+const AROUND: u32 = 32;
 
 /// A planar face: its outward normal and its corners, counter-clockwise seen from outside.
 #[derive(Debug, Clone, PartialEq)]
@@ -92,6 +96,43 @@ fn around(points: &[Point3<f64>], normal: &Vector3<f64>) -> Vec<Point3<f64>> {
         .into_iter()
         .map(|[x, y]| first + u * x + v * y)
         .collect()
+}
+
+/// Faces of a hollow wall around z, open at both ends. Radii are outer radii. Unit: metres.
+pub(super) fn tube(radius_low: f64, radius_high: f64, wall: f64, height: f64) -> Vec<Face> {
+    let top = height / 2.0;
+    // Cross-section of the wall: outside, upper rim, inside, lower rim.
+    let profile = [
+        (radius_low, -top),
+        (radius_high, top),
+        (radius_high - wall, top),
+        (radius_low - wall, -top),
+    ];
+    let at = |(radius, z): (f64, f64), step: u32| {
+        let angle = TAU * f64::from(step % AROUND) / f64::from(AROUND);
+        let radius = radius.max(0.0);
+        Point3::new(radius * libm::cos(angle), radius * libm::sin(angle), z)
+    };
+    let sides = profile.iter().zip(profile.iter().cycle().skip(1));
+    let quads = sides.flat_map(|(a, b)| {
+        (0..AROUND).map(move |step| {
+            vec![
+                at(*a, step),
+                at(*a, step + 1),
+                at(*b, step + 1),
+                at(*b, step),
+            ]
+        })
+    });
+    let face = |corners: Vec<Point3<f64>>| {
+        // If the wall has no thickness, two corners of its rim coincide.
+        let turned = (corners[2] - corners[0]).cross(&(corners[3] - corners[1]));
+        Some(Face {
+            normal: turned.try_normalize(1e-12)?,
+            corners,
+        })
+    };
+    quads.filter_map(face).collect()
 }
 
 #[cfg(test)]
