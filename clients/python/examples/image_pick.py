@@ -40,6 +40,8 @@ def pick(robot: Robot, pickObject: str) -> Report:
     image = robot.image()
     if "--look" in sys.argv:
         return Report(False, "it only looked")
+    # The head is level again before the arm rises beside it.
+    robot.move_joints(dict(zip(robot.description.head_joints, (0.0, 0.0))))
     furniture = [thing for thing in robot.objects() if thing.furniture]
     x, y, _ = robot.observe().base
     table = min(furniture, key=lambda thing: thing.beside(np.array([x, y, 0.0])))
