@@ -14,7 +14,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 sys.path.insert(0, str(EXAMPLES))
 
 from grasp_offset import FEATURES, Network, corrected, features
-from image_place import CELL, WINDOWS, PlaceNetwork, cells
+from image_place import CELL, WINDOWS, Array, PlaceNetwork, cells
 from train_grasp_offset import learn
 from train_image_place import CHANNELS, backward, wanted
 from train_image_place import learn as learn_place
@@ -58,7 +58,7 @@ class ImagePlace(unittest.TestCase):
     def test_the_slopes_are_those_of_the_loss(self) -> None:
         generator = np.random.default_rng(3)
         sizes = zip(WINDOWS, CHANNELS[:-1], CHANNELS[1:], strict=True)
-        weights = [generator.normal(0.0, 0.2, (side * side * inner, outer)) for side, inner, outer in sizes]
+        weights: list[Array] = [generator.normal(0.0, 0.2, (side * side * inner, outer)) for side, inner, outer in sizes]
         network = PlaceNetwork(weights, [generator.normal(0.0, 0.1, outer) for outer in CHANNELS[1:]])
         views = generator.normal(0.0, 1.0, (2, 9, 9, 3))
         target = wanted(np.array([(12.0, 20.0), (30.0, 8.0)]), (9, 9)).astype(np.float64)
