@@ -61,6 +61,12 @@ pub struct ListArgs {
 }
 
 impl ListArgs {
+    /// Whether the list is one of failures for people, with their reasons. Programs read the values
+    /// of runs, which are the same in all lists.
+    fn says_why(&self) -> bool {
+        self.wanted() == Some(Outcome::Failed) && self.format == Format::Text
+    }
+
     /// The outcome that a run must have.
     fn wanted(&self) -> Option<Outcome> {
         if self.failed {
@@ -104,7 +110,7 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
         runs.retain(|row| found.contains(&row.run));
     }
     // A list of failures for people names the failed properties instead of all values.
-    let all = !args.failed || args.format != Format::Text;
+    let all = !args.says_why();
     // Most campaigns have neither, so empty columns are hidden.
     let repeated = runs.iter().any(|row| row.repetition.is_some());
     let weighted = runs.iter().any(|row| row.weight.is_some());
@@ -132,7 +138,7 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
         "test",
         "score",
     ]);
-    if args.failed {
+    if args.says_why() {
         table.columns.extend(["failed", "why"].map(str::to_owned));
     }
     table.columns.extend(
@@ -157,7 +163,7 @@ pub fn list(args: &ListArgs) -> Result<(), Diagnostics> {
             .flatten()
             .map(|words| words.as_str().into());
         let contested = any_contested.then(|| contested_in(&row.run));
-        let why = args.failed.then(|| {
+        let why = args.says_why().then(|| {
             let names = failed.get(&row.run).map_or("", String::as_str);
             [names.into(), reason(&history, &row.run).into()]
         });
@@ -291,7 +297,7 @@ fn chosen_runs(
                     args.property.iter().map(outcomes).collect(),
                 );
             }
-            if args.failed {
+            if args.says_why() {
                 let of_run = run.outcomes.iter();
                 let mut names: Vec<&str> = of_run
                     .filter(|own| own.outcome == Outcome::Failed)

@@ -48,7 +48,7 @@ function chooser(quantities, usual, thresholds, seconds, redraw) {
     const fitting = quantities.filter(({ name }) => words.every((word) => name.toLowerCase().includes(word)));
     const groups = new Map();
     for (const quantity of fitting.slice(0, MOST_LISTED)) groups.set(quantity.group, (groups.get(quantity.group) ?? []).concat(quantity));
-    fill(list, [...groups].map(([group, of]) => [make("h3", {}, group), of.map(row)]),
+    fill(list, [...groups].map(([group, of]) => [make("div", { class: "group" }, group), of.map(row)]),
       fitting.length > MOST_LISTED && make("p", { class: "faint" }, `${counted(fitting.length - MOST_LISTED, "more signal")}: filter the list`),
       fitting.length === 0 && make("p", { class: "faint" }, "No signal has these words in its name."));
   };
