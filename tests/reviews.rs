@@ -54,7 +54,7 @@ fn a_change_is_reviewed_in_markdown_and_in_a_browser() {
     assert!(output.status.success(), "{}", stderr(&output));
     let text = stdout(&output);
     for wanted in [
-        "## actcheck: B is worse than A",
+        "## actcheck: Undecided: about ",
         "Pick MovedObject",
         "fail in B only",
         "moved\\_object.rls",

@@ -45,6 +45,7 @@ fn content(page: &ReviewPage<'_>) -> String {
     pack.set("version", page.version);
     pack.set("made", page.made);
     pack.set("headline", review.headline());
+    pack.set("answer", review.answer());
     pack.set("compared", compare_json(review.summary));
     let groups = review.summary.flip_groups();
     pack.set(

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::summary::compared_name;
 use crate::{CompareSummary, Divergence, FlipGroup, SharedEvent};
-use actcheck_analysis::Answer;
+use actcheck_analysis::{Answer, ComparedLine};
 use actcheck_base::{Judgement, Outcome, names};
 use actcheck_history::RunDetail;
 
@@ -99,6 +99,11 @@ impl Review<'_> {
             let names: Vec<String> = of_it.map(|line| compared_name(&line.of)).collect();
             names.join(", ")
         };
+        let worse = self.gated();
+        if !worse.is_empty() {
+            let names: Vec<String> = worse.iter().map(|line| compared_name(&line.of)).collect();
+            return format!("B is worse than A: {}", names.join(", "));
+        }
         match summary.answer() {
             Answer::Worse => format!("B is worse than A: {}", with(Answer::Worse)),
             Answer::Better => format!("B is better than A: {}", with(Answer::Better)),
@@ -113,6 +118,20 @@ impl Review<'_> {
                 "Undecided: over a million scenes would decide".to_owned()
             }
         }
+    }
+
+    /// The answer in a word: worse if the comparison fails for it.
+    pub fn answer(&self) -> &'static str {
+        match self.gated().is_empty() {
+            true => self.summary.answer().word(),
+            false => Answer::Worse.word(),
+        }
+    }
+
+    /// The lines for which the comparison fails, by its one-sided test.
+    fn gated(&self) -> Vec<&ComparedLine> {
+        let level = self.summary.level;
+        level.map_or_else(Vec::new, |level| self.summary.comparison.worse_at(level))
     }
 
     /// The pairs of a group that are known in detail.

@@ -162,7 +162,7 @@ async function reviewMain() {
     const place = make("div", {}), lists = make("div", {});
     element.className = "review";
     fill(element,
-      make("h1", {}, review.headline, " ", badge(ANSWERS[compared.answer], SAID[compared.answer] ?? compared.answer)),
+      make("h1", {}, review.headline, " ", badge(ANSWERS[review.answer], SAID[review.answer] ?? review.answer)),
       make("dl", { class: "facts" }, sideLine(compared.a, "A"), sideLine(compared.b, "B")),
       make("div", { class: "first" }, rateTable(compared), changes(compared)), knownIssues(compared), lists, place);
     const pairs = review.groups.flatMap((group) => group.pairs).filter((pair) => pair.known);
