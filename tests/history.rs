@@ -881,7 +881,7 @@ fn a_history_of_another_format_is_not_changed() {
             );
         }
     }
-    std::fs::write(dir.join("VERSION"), "actcheck history 6\n").unwrap();
+    std::fs::write(dir.join("VERSION"), "actcheck history 7\n").unwrap();
     assert_eq!(
         History::open_existing(&dir)
             .unwrap()

@@ -287,7 +287,7 @@ fn no_command_follows_a_link_of_a_history() {
     // A folder of its own, with nothing but a version and links, as in a small pull request.
     let stranger = Stranger::new();
     std::fs::create_dir(stranger.history()).unwrap();
-    std::fs::write(stranger.history().join("VERSION"), "actcheck history 6\n").unwrap();
+    std::fs::write(stranger.history().join("VERSION"), "actcheck history 7\n").unwrap();
     stranger.link("configs/.actcheck/campaigns", "");
     assert!(stranger.unchanged(&COMMANDS, "only campaigns")[12].contains("H027"));
 }

@@ -124,7 +124,7 @@ fn runs_kept_as_outcomes_answer_as_whole_runs_do() {
         let [whole, outcomes] = both(folder.path(), ended);
         assert_eq!(
             std::fs::read_to_string(outcomes.join("VERSION")).unwrap(),
-            "actcheck history 6\n"
+            "actcheck history 7\n"
         );
         assert!(whole.join("campaigns/k/0001.motion").exists());
         assert_eq!(

@@ -340,7 +340,7 @@ fn an_empty_history_has_empty_lists() {
     let dir = folder.path().join("h");
     drop(History::open(&dir).unwrap());
     let version = std::fs::read_to_string(dir.join("VERSION")).unwrap();
-    assert_eq!(version, "actcheck history 6\n");
+    assert_eq!(version, "actcheck history 7\n");
     let reader = History::open_to_read(&dir).unwrap();
     let all = RunFilter::default();
     assert_eq!((run_ids(&reader).len(), History::count_runs(&dir)), (0, 0));

@@ -17,7 +17,7 @@ use crate::segment::SegmentColumn;
 use actcheck_base::{Below, Diagnostics, Digest, FileKind, names};
 
 /// Format of the folder. It changes whenever a file of it does.
-const FORMAT: u64 = 6;
+const FORMAT: u64 = 7;
 const TITLE: &str = "actcheck history";
 /// Longest version file. Unit: bytes.
 const LONGEST_VERSION: u64 = 1_000;
