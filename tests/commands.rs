@@ -267,23 +267,27 @@ fn an_empty_answer_names_the_terms_that_do_not_exist() {
             "h",
         ],
     );
-    let told = |query: &str| {
+    let told = |query: &str, code: i32| {
         let output = actcheck(project.path(), &["query", "--history", "h", query]);
-        assert!(output.status.success(), "{}", stderr(&output));
+        assert_eq!(output.status.code(), Some(code), "{}", stderr(&output));
         stderr(&output)
     };
-    let misspelt = told("SELECT ?run { ?o act:ofRun ?run ; act:rol \"target\" }");
+    let misspelt = told("SELECT ?run { ?o act:ofRun ?run ; act:rol \"target\" }", 2);
     assert!(
         misspelt.contains("no term `act:rol`") && misspelt.contains("did you mean `act:role`?"),
         "{misspelt}"
     );
     assert_eq!(
-        told("SELECT ?run { ?o act:ofRun ?run ; act:role \"act:rol\" }"),
+        told(
+            "SELECT ?run { ?o act:ofRun ?run ; act:role \"act:rol\" }",
+            0
+        ),
         NONE
     );
     assert_eq!(
         told(
-            "SELECT ?a { GRAPH act:rechecked { ?a earl:test act:MovedObject } FILTER(act:counts(?a)) }"
+            "SELECT ?a { GRAPH act:rechecked { ?a earl:test act:MovedObject } FILTER(act:counts(?a)) }",
+            0
         ),
         NONE
     );

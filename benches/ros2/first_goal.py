@@ -61,7 +61,7 @@ def without_care(number, ready):
 
 
 class Simulation:
-    """A simulation that stands still."""
+    """A simulation in which nothing moves."""
 
     def __init__(self):
         self.description = RobotDescription.from_wire(fake.hello())

@@ -40,7 +40,7 @@ pub struct World {
     shown: Shown,
 }
 
-/// What colour images show, for which the simulation has no use.
+/// Surfaces and light of colour images, for which the simulation has no use.
 #[derive(Default)]
 struct Shown {
     skins: Option<Arc<LazySkins>>,

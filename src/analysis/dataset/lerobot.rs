@@ -82,7 +82,7 @@ pub fn export_lerobot(
 }
 
 /// A row of the data.
-struct Frame {
+struct EpisodeFrame {
     state: Vec<f32>,
     action: Vec<f32>,
     png: Vec<u8>,
@@ -106,7 +106,7 @@ struct Export<'a> {
     tasks: Vec<String>,
     episodes: Vec<Episode>,
     /// Rows of the present file.
-    frames: Vec<Frame>,
+    frames: Vec<EpisodeFrame>,
     bytes: usize,
     file: usize,
     n_frames: usize,
@@ -175,7 +175,7 @@ impl<'a> Export<'a> {
                 .and_then(|rows| rows.get(moment.row));
             let Some(row) = row else { continue };
             let joints = || row.joints();
-            let frame = Frame {
+            let frame = EpisodeFrame {
                 state: joints()
                     .map(|joint| joint.position)
                     .chain([row.opening_m])
@@ -233,7 +233,7 @@ impl<'a> Export<'a> {
             return Ok(());
         }
         let start = self.n_frames - frames.len();
-        let lists = |of: fn(&Frame) -> &Vec<f32>| -> Vec<Series> {
+        let lists = |of: fn(&EpisodeFrame) -> &Vec<f32>| -> Vec<Series> {
             frames
                 .iter()
                 .map(|frame| Series::new("".into(), of(frame)))
@@ -243,7 +243,7 @@ impl<'a> Export<'a> {
         let times = frames
             .iter()
             .map(|frame| (frame.number as f64 / self.fps) as f32);
-        let count = |of: &dyn Fn(usize, &Frame) -> usize| -> Vec<i64> {
+        let count = |of: &dyn Fn(usize, &EpisodeFrame) -> usize| -> Vec<i64> {
             let counts = frames.iter().enumerate();
             counts.map(|(idx, frame)| signed(of(idx, frame))).collect()
         };
@@ -276,7 +276,7 @@ impl<'a> Export<'a> {
     }
 
     /// The column of images. Hugging Face's reader takes no views, which are the usual kind here.
-    fn files(&self, frames: &[Frame]) -> Result<Series, Diagnostics> {
+    fn files(&self, frames: &[EpisodeFrame]) -> Result<Series, Diagnostics> {
         let files = frames.iter().map(|frame| AnyValue::Binary(&frame.png));
         let files: Vec<AnyValue<'_>> = files.collect();
         Series::from_any_values_and_dtype(IMAGE.into(), &files, &DataType::BinaryOffset, true)

@@ -15,7 +15,7 @@ pub(super) struct Buffer {
 }
 
 /// A corner of a triangle in the image: samples to the right and down, and its nearness.
-pub(super) type Corner = [f64; 3];
+pub(super) type ScreenCorner = [f64; 3];
 
 impl Buffer {
     pub(super) fn new(width: usize, height: usize) -> Self {
@@ -28,7 +28,7 @@ impl Buffer {
     }
 
     /// Fills the samples at which a triangle is the nearest.
-    pub(super) fn fill(&mut self, [a, b, c]: [Corner; 3], facet: u32) {
+    pub(super) fn fill(&mut self, [a, b, c]: [ScreenCorner; 3], facet: u32) {
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
         if !area.is_finite() || area.abs() < 1e-12 {
             return;
@@ -91,7 +91,7 @@ fn first_after(at: f64, most: usize) -> usize {
 }
 
 /// The samples of a row that are between the edges of a triangle; `None` if there are none.
-fn span(edges: &[[Corner; 2]; 3], y: f64, width: usize) -> Option<[usize; 2]> {
+fn span(edges: &[[ScreenCorner; 2]; 3], y: f64, width: usize) -> Option<[usize; 2]> {
     let (mut left, mut right) = (f64::INFINITY, f64::NEG_INFINITY);
     for [from, to] in edges {
         // Each edge contains its upper end only, so that a row meets two edges or none.
@@ -123,7 +123,7 @@ mod tests {
             [[2.3, 3.1], [40.2, 7.7], [35.9, 44.4], [5.0, 41.3]].map(|[x, y]| [x, y, near])
         };
         let [a, b, c, d] = square(1.0);
-        let count = |triangles: &[[Corner; 3]]| {
+        let count = |triangles: &[[ScreenCorner; 3]]| {
             let mut buffer = Buffer::new(48, 48);
             for (number, corners) in (0_u32..).zip(triangles) {
                 buffer.fill(*corners, number);

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use nalgebra::{Isometry3, Point3, Vector3};
 
 use crate::rays::Lens;
-use crate::render::buffer::{Buffer, Corner, EMPTY};
+use crate::render::buffer::{Buffer, EMPTY, ScreenCorner};
 use crate::render::finish::{Finish, to_light};
 use crate::render::shadow::Shadows;
 use crate::render::skin::{Facet, Skin};
@@ -172,7 +172,7 @@ impl Scene<'_> {
     /// Fills the part of a triangle that is in front of the eye.
     fn fill(&self, buffer: &mut Buffer, corners: [Point3<f64>; 3], near_m: f64, number: u32) {
         let n_before = corners.iter().filter(|corner| corner.x > near_m).count();
-        let all = |points: &[Point3<f64>]| -> Option<Vec<Corner>> {
+        let all = |points: &[Point3<f64>]| -> Option<Vec<ScreenCorner>> {
             let corner = |point: &Point3<f64>| {
                 let [x, y] = self.lens.pixel(point)?;
                 Some([x, y, 1.0 / point.x])
@@ -218,7 +218,7 @@ impl Scene<'_> {
                 skin, pose, scale, ..
             } = placed.body;
             let points = skin.points.iter();
-            let corners: Vec<Corner> = points
+            let corners: Vec<ScreenCorner> = points
                 .map(|point| shadows.corner(&(pose * (point * *scale))))
                 .collect();
             for facet in &skin.facets {

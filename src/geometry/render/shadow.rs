@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Point3, Rotation3, Vector3};
 
-use crate::render::buffer::{Buffer, Corner};
+use crate::render::buffer::{Buffer, ScreenCorner};
 
 /// Cells of the map in each direction.
 const CELLS: usize = 1024;
@@ -58,7 +58,7 @@ impl Shadows {
     }
 
     /// Returns the corner of a triangle in the map. Frame of the point: world.
-    pub(super) fn corner(&self, point: &Point3<f64>) -> Corner {
+    pub(super) fn corner(&self, point: &Point3<f64>) -> ScreenCorner {
         let seen = self.turned * point;
         [
             (seen.x - self.low[0]) / self.cell_m,
@@ -68,7 +68,7 @@ impl Shadows {
     }
 
     /// Adds a triangle that throws a shadow.
-    pub(super) fn add(&mut self, corners: [Corner; 3]) {
+    pub(super) fn add(&mut self, corners: [ScreenCorner; 3]) {
         self.map.fill(corners, 0);
     }
 

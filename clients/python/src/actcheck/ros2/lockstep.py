@@ -67,7 +67,7 @@ class Lockstep:
         self._qos = qos = QoSProfile(depth=1000, reliability=ReliabilityPolicy.RELIABLE)
         self._clock = node.create_publisher(Clock, "/clock", qos)
         # A node of its own: while the simulation waits for a mark, nothing else is taken, so that the order of its callbacks
-        # does not depend on what came first.
+        # does not depend on which message came first.
         self._marks = Node(f"{node.get_name()}_marks", context=node.context, start_parameter_services=False, enable_rosout=False)
         self._marks.create_subscription(Clock, MARK, self._marked, qos)
         self._marker = SingleThreadedExecutor(context=node.context)
@@ -123,7 +123,7 @@ class Lockstep:
         self._marks.destroy_node()
 
     def graphs(self) -> list[dict[str, Any]]:
-        """What the nodes of every process publish and call, with the number of their matches."""
+        """The publishers and clients of every process, with the number of their matches."""
         found = []
         for kept in self.kept:
             if kept.turns.get_subscription_count() == 0:
@@ -164,12 +164,12 @@ class Lockstep:
             return
         if not reply["marked"]:
             self._alive()
-            raise BrokenNode(f"{kept.program} shut its ROS context down, or destroyed what the keeper needs")
+            raise BrokenNode(f"{kept.program} shut its ROS context down, or destroyed the keeper's node")
         self._until_marked(kept)
         before = self._handled
         self.drain()
         for other in self.kept:
-            # What a process sends to itself arrives within its turn.
+            # Messages of a process to itself arrive within its turn.
             other.due = other.due or other is not kept or self._handled != before
 
     def drain(self) -> None:
@@ -241,14 +241,14 @@ class FreeRunning:
         self.address, self.nodes = "", 0
 
     def accept(self) -> None:
-        """Nobody calls."""
+        """No process calls."""
 
     def hold(self, now: int) -> None:
         """The clock starts to run."""
         self._started = (time.monotonic(), now)
 
     def free(self) -> None:
-        """Nobody is held."""
+        """No process is held."""
 
     def close(self) -> None:
         """Nothing is open."""

@@ -18,7 +18,7 @@ from actcheck.ros2.faults import MappingFault
 LAUNCH = (".launch.py", ".launch.xml", ".launch.yaml")
 #: A value of the campaign within a text of the mapping.
 NAMED = re.compile(r"\{([A-Za-z_]\w*)((?:\.[A-Za-z_]\w*)*)\}")
-#: What can follow a designator's name.
+#: Parts that can follow a designator's name.
 PARTS = ("", ".pose", ".position", ".size", ".category")
 
 
@@ -72,7 +72,7 @@ class SkillMapping:
     frame: str = "map"
     #: Messages of the robot's state for each second of simulated time.
     rate_hz: float = 60.0
-    #: Images of the depth camera for each second of simulated time, while somebody subscribes to them.
+    #: Images of the depth camera for each second of simulated time, while a node subscribes to them.
     camera_hz: float = 5.0
     #: How long the nodes may take to start, and to compute at one moment. Unit: seconds of wall-clock time.
     startup_s: float = 25.0
@@ -190,7 +190,7 @@ def _commands(top: _Reader) -> tuple[tuple[str, ...], ...]:
         try:
             words = shlex.split(text) if isinstance(text, str) else []
         except ValueError as error:
-            top.fault("test_launcher", f"`test_launcher` is no command: {error}")
+            top.fault("test_launcher", f"`test_launcher` is not a command: {error}")
             continue
         if not words:
             top.fault("test_launcher", "`test_launcher` must be a command, or a list of commands")
@@ -219,7 +219,7 @@ def _action(table: _Reader, places: Mapping[str, Any]) -> Action:
         try:
             succeeded = (name, tomllib.loads(f"value = {value}")["value"] if value else True)
         except tomllib.TOMLDecodeError:
-            given.fault("succeeded", f"`{given.path}succeeded`: `{value}` is no value; a text is written in quotes")
+            given.fault("succeeded", f"`{given.path}succeeded`: `{value}` is not a value; a text is written in quotes")
     message = given.take("message", str, None, "a field of the result")
     perceived = None
     things = given.take("perceived", dict, None, "a table with `list` and `pose`")

@@ -384,7 +384,7 @@ class RosRobot:
         return positions
 
     def wants_camera(self) -> bool:
-        """Whether somebody subscribes to the depth camera."""
+        """Whether a node subscribes to the depth camera."""
         return any(publisher.get_subscription_count() for publisher in self._camera.values())
 
     def publish_camera(self, image: DepthImage, now: int) -> None:

@@ -1,6 +1,6 @@
 """Keeps a node in step with the simulation, from inside its process and without a change to its source.
 
-Simulated time stands still while nodes compute. The simulation gives the processes turns, one at a time. In its turn, a
+No simulated time passes while nodes compute. The simulation gives the processes turns, one at a time. In its turn, a
 process does everything that is ready and then says that it is idle; between turns it does nothing. Within a process one
 thread runs at a time: it has the *baton*. A thread that waits (in an executor, for a lock, a condition or a time) gives the
 baton away, and enters a queue when it is woken. So the order of all callbacks is the same every time, also with a
@@ -57,7 +57,7 @@ class _Parked:
 
 
 def _position(task):
-    """Where a coroutine stands that was begun; `None` if the task is another function, not begun, or done."""
+    """The place that a coroutine has reached; `None` if the task is another function, not begun, or done."""
     coroutine = getattr(task, "_handler", None)
     if getattr(coroutine, "cr_await", None) is None:
         return None
@@ -70,7 +70,7 @@ def _position(task):
 
 
 class _Pool:
-    """Stands in for the thread pool of a multi-threaded executor: its threads take turns."""
+    """Replaces the thread pool of a multi-threaded executor: its threads take turns."""
 
     def __init__(self, keeper, most):
         self.keeper, self.most, self.active = keeper, most, 0
@@ -106,7 +106,7 @@ class _Pool:
                 place[1]()
             finally:
                 with keeper.lock:
-                    # Executors try tasks again that await something; a try that changes nothing is no activity.
+                    # Executors try tasks again that await something; a try that changes nothing does not count.
                     if before is None or _position(place[1]) != before:
                         keeper.activity += 1
                     self.active -= 1
@@ -448,7 +448,7 @@ class Keeper:
         self.tries[kind, which] = (self.now, tries + 1 if moment == self.now else 1)
         return self.tries[kind, which][1] > 2
 
-    # What can't be kept in step.
+    # Nodes that can't be kept in step.
 
     def fault(self, kind, words, frame):
         """Notes something that can't be kept in step, once."""
@@ -705,7 +705,7 @@ def _patient(keeper):
 
 
 def _install_threads(keeper):
-    """Threads of the node's own: what they wait for is waiting for others of the process."""
+    """Threads of the node's own: their waiting is waiting for others of the process."""
     condition = threading.Condition
     notifies, waits = condition.notify, condition.wait
 
