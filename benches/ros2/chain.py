@@ -9,6 +9,7 @@ import random
 import sys
 import threading
 import time
+from time import sleep  # by name, before rclpy: it is of simulated time, too
 
 import rclpy
 from control_msgs.action import FollowJointTrajectory
@@ -110,7 +111,7 @@ class Motion(Node):
                 self.one(goal, target)
                 steps += 1
                 if steps % 3 == 0:
-                    time.sleep(0.02)
+                    sleep(0.02)
                 elif steps % 3 == 1:
                     self.rate.sleep()
                 else:

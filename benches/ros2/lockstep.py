@@ -90,7 +90,7 @@ def main():
             ticks, begun = 0, time.monotonic()
             traces.clear()
             results.clear()
-        log, steps, x, target[0] = [], 0, 0.0, 0.0
+        log, x, target[0] = [], 0.0, 0.0
         result = handle = None
         # A repetition begins at a multiple of the timers' periods, so that all begin alike.
         for tick in range(-20, 900):

@@ -128,7 +128,7 @@ impl RunPictures<'_> {
         self
     }
 
-    /// Draws the image of a frame of the trace. `None` if there is no such frame, or the trace has
+    /// Draws the image of a frame of the trace. `None` if the trace lacks this frame, or has
     /// no pose of the camera.
     pub fn frame(&self, frame: usize) -> Option<RunPicture> {
         let row = self.rows.get(frame)?;

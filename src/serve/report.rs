@@ -125,7 +125,7 @@ impl LiveReport {
     /// Returns the replay of a run, in JSON: `forms` and `replay`.
     ///
     /// # Errors
-    /// A refusal if there is no such run, or if it can't be replayed.
+    /// A refusal if the run does not exist, or can't be replayed.
     pub fn replay(&self, run: &str) -> Result<Bytes, Refusal> {
         let is_known = |c: char| c.is_alphanumeric() || "-_.".contains(c);
         if run.is_empty() || run.len() > LONGEST_ID || !run.chars().all(is_known) {

@@ -74,7 +74,7 @@ class Mappings(unittest.TestCase):
             "x = [": ["it is not TOML"],
             GOOD.replace('server = "/pick"\n', ""): [":3: `actions.Pick.server` is missing"],
             GOOD.replace("my_msgs/action/Pick", "Pick"): [":5: `actions.Pick.type` must be of the form PACKAGE/action/NAME"],
-            GOOD.replace("server =", "sevrer ="): [":4: there is no key `actions.Pick.sevrer`: did you mean `server`?"],
+            GOOD.replace("server =", "sevrer ="): [":4: unknown key `actions.Pick.sevrer`: did you mean `server`?"],
             GOOD.replace("{pickObject.pose}", "{pickObject.place}"): [":6: `{pickObject.place}`: after a designator's name"],
             GOOD.replace("[1.0, 2.0, 1.57]", "[1.0, 2.0]"): [":10: `places.kitchen` must be [x, y, heading]"],
             GOOD.replace('"server.py --speed 0.5"', '"server.py \'"'): [":1: `test_launcher` is not a command"],
@@ -84,7 +84,7 @@ class Mappings(unittest.TestCase):
             "rate_hz = true\n" + GOOD: [":1: `rate_hz` must be a number"],
             GOOD.replace("error_code == 0", "error_code == done"): ["`done` is not a value"],
             GOOD.replace('result = {', 'result = { perceived = { list = "things" },'): ["`actions.Pick.result.perceived` needs `list`"],
-            GOOD + "[robot]\narms = 'x'\n": ["there is no key `robot.arms`: did you mean `arm`?"],
+            GOOD + "[robot]\narms = 'x'\n": ["unknown key `robot.arms`: did you mean `arm`?"],
         }
         for text, words in cases.items():
             with self.assertRaises(MappingFault) as caught:
@@ -139,7 +139,7 @@ class Goals(unittest.TestCase):
             pose_of(pose_message(math.nan), "map", "result")
         with self.assertRaisesRegex(BrokenNode, "an orientation of length 0"):
             pose_of(pose_message(w=0.0), "map", "result")
-        with self.assertRaisesRegex(BrokenNode, "there is no `pose`; there are x"):
+        with self.assertRaisesRegex(BrokenNode, "the message has no `pose`; it has x"):
             field(Message(x=1), "pose")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import os
 import sys
 from pathlib import Path
@@ -10,6 +11,9 @@ from pathlib import Path
 from actcheck.ros2 import environment
 from actcheck.ros2.faults import MappingFault
 from actcheck.ros2.mapping import read
+
+#: Modules of ROS 2 that the bridge uses.
+NEEDED = ("rclpy", "control_msgs.action", "nav_msgs.msg", "sensor_msgs.msg", "tf2_msgs.msg")
 
 
 def main() -> None:
@@ -40,14 +44,14 @@ def _find_ros() -> None:
         for name in ("PYTHONPATH", "LD_LIBRARY_PATH", "AMENT_PREFIX_PATH"):
             added[name] = os.pathsep.join(filter(None, [added[name], os.environ.get(name, "")]))
         os.execve(sys.executable, [sys.executable, "-m", "actcheck.ros2", *sys.argv[1:]], {**os.environ, **added, "ACTCHECK_ROS2": str(folder)})
-    try:
-        import rclpy
-    except ImportError as error:
-        sys.exit(
-            f"actcheck.ros2: there is no rclpy here ({error}): source a ROS 2 of this Python's version, or make one with "
-            f"`python3 {script} FOLDER` and use its FOLDER/bin/python"
-        )
-    del rclpy
+    for name in NEEDED:
+        try:
+            importlib.import_module(name)
+        except ImportError as error:
+            sys.exit(
+                f"actcheck.ros2: {name} can't be imported ({error}): source a ROS 2 of this Python's version, or make one with "
+                f"`python3 {script} FOLDER` and use its FOLDER/bin/python"
+            )
 
 
 if __name__ == "__main__":

@@ -175,7 +175,7 @@ class RunOfNodes:
             if not client.server_is_ready():
                 wanted = self._mapping.actions[action]
                 seen = sorted({name for _, found in self._servers() for name in found})
-                return f"there is no action server {wanted.server} of type {wanted.type}; there are {', '.join(seen) or 'none'}"
+                return f"the action server {wanted.server} of type {wanted.type} has not appeared; present: {', '.join(seen) or 'none'}"
         graphs = self._step.graphs()
         if isinstance(self._step, FreeRunning):
             return ""
@@ -186,11 +186,11 @@ class RunOfNodes:
                 return f"the nodes {', '.join(graph['nodes'])} do not spin"
             for kind, name, matches in graph["ends"]:
                 if kind == "publisher" and self._node.count_subscribers(name) > matches:
-                    return f"a subscriber of {name} has not been found by its publisher"
+                    return f"a subscriber of {name} has not been found by its publisher; perhaps their QoS does not match"
                 if kind == "client" and name == MARK:
                     return "a process has no node yet"
                 if kind == "client" and not matches and self._node.count_services(name):
-                    return f"the service {name} has not been found by its client"
+                    return f"the service {name} has not been found by its client; perhaps their types differ"
         return ""
 
     def _servers(self) -> list[tuple[str, list[str]]]:

@@ -83,14 +83,14 @@ def make(folder: Path) -> None:
         )
     for tool, package in (("cc", "gcc"), ("c++", "g++"), ("make", "make")):
         if shutil.which(tool) is None:
-            raise EnvironmentFault(f"the interfaces are compiled, but there is no `{tool}`: `apt install {package}`")
+            raise EnvironmentFault(f"the interfaces are compiled, which needs `{tool}`: `apt install {package}`")
     python = folder / "bin" / "python"
     _run("making the environment", [sys.executable, "-m", "venv", "--clear", str(folder)])
     pip = [str(python), "-m", "pip", "install", "--quiet", "--no-deps", "--disable-pip-version-check"]
     _run("installing the wheels", [*pip, "-r", str(HERE / "pins.txt")])
     _rewrite(folder)
     # The same package as the one that runs now, wherever it is.
-    (_site(folder) / "actcheck.pth").write_text(f"{HERE.parents[1]}\n")
+    (_site(folder) / "actcheck").symlink_to(HERE.parent.absolute())
     _build(folder)
     (folder / STAMP).write_text(stamp())
 

@@ -154,7 +154,7 @@ def field(message: Any, path: str) -> Any:
     for name in path.split("."):
         if not hasattr(value, name):
             has = ", ".join(value.get_fields_and_field_types()) if hasattr(value, "get_fields_and_field_types") else "none"
-            raise BrokenNode(f"the mapping reads the field `{path}`, but there is no `{name}`; there are {has}")
+            raise BrokenNode(f"the mapping reads the field `{path}`, but the message has no `{name}`; it has {has}")
         value = getattr(value, name)
     return value
 

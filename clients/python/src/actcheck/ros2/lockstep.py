@@ -22,7 +22,7 @@ from rosgraph_msgs.msg import Clock
 from actcheck.ros2.faults import BrokenNode
 
 _LENGTH = struct.Struct("<I")
-#: Topics with which both sides know that all earlier messages have arrived, as in `inside/keeper.py`: a message is received after
+#: Topics with which both sides know that all earlier messages have arrived, as in `inside/actcheck_keeper.py`: a message is received after
 #: all that were sent before it, by whomever, since they come through the same socket.
 MARK, TURN = "/actcheck/mark", "/actcheck/turn_"
 #: Most rounds of messages at one moment: more are a flood, of nodes that answer each other without end.
@@ -88,7 +88,7 @@ class Lockstep:
     def hold(self, now: int) -> None:
         """From now on, processes act only in their turns."""
         self._now = now
-        # The order of turns must not depend on who was faster at the start.
+        # The order of turns must not depend on which process started faster.
         self.kept.sort(key=lambda kept: kept.order)
         since = time.monotonic()
         while any(kept.turns.get_subscription_count() == 0 for kept in self.kept):

@@ -109,8 +109,8 @@ class _Reader:
     def end(self) -> None:
         for key in self.table:
             near = difflib.get_close_matches(key, self.known, 1)
-            hint = f": did you mean `{near[0]}`?" if near else f"; there are {', '.join(f'`{name}`' for name in self.known)}"
-            self.fault(key, f"there is no key `{self.path}{key}`{hint}")
+            hint = f": did you mean `{near[0]}`?" if near else f"; the known ones are {', '.join(f'`{name}`' for name in self.known)}"
+            self.fault(key, f"unknown key `{self.path}{key}`{hint}")
 
     def _line(self, key: str) -> int:
         """The line of a key: in its table, if the table has a head of its own."""

@@ -128,7 +128,7 @@ class Nodes:
                 raise BrokenNode(f"{program.name} {words}" + (f": {last}" if last else ""))
 
     def output(self) -> list[str]:
-        """Output of all programs, one after the other, so that it does not depend on who was faster."""
+        """Output of all programs, one after the other, so that it does not depend on which one was faster."""
         several = len(self._programs) > 1
         return [f"[{program.name}] {line}" if several else line for program in self._programs for line in program.output()]
 
@@ -150,11 +150,11 @@ def _resolved(words: Sequence[str], folder: Path) -> list[str]:
     file = folder / first
     if first.endswith(LAUNCH):
         if shutil.which("ros2") is None:
-            raise BrokenNode(f"{first} is a launch file, but there is no `ros2` here: source a ROS 2, or name the nodes' commands")
+            raise BrokenNode(f"{first} is a launch file, but the program `ros2` was not found: source a ROS 2, or name the nodes' commands")
         return ["ros2", "launch", str(file) if file.exists() else first, *words[1:]]
     if first.endswith(".py"):
         if not file.exists():
-            raise BrokenNode(f"there is no file {file}")
+            raise BrokenNode(f"the file {file} does not exist")
         return [sys.executable, "-u", str(file), *words[1:]]
     if first in ("python", "python3"):
         return [sys.executable, "-u", *words[1:]]

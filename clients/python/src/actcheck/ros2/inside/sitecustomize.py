@@ -5,16 +5,9 @@ import importlib.machinery
 import importlib.util
 import os
 import sys
+import time
 
 _HERE = os.path.dirname(os.path.abspath(__file__))
-
-
-def _load(name, path):
-    spec = importlib.util.spec_from_file_location(name, path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules.setdefault(name, module)
-    spec.loader.exec_module(module)
-    return module
 
 
 def _chain():
@@ -39,13 +32,21 @@ class _AfterRclpy(importlib.abc.MetaPathFinder):
 
         def executed(module):
             execute(module)
-            keeper = sys.modules.get("actcheck_keeper") or _load("actcheck_keeper", os.path.join(_HERE, "keeper.py"))
-            keeper.install(module, os.environ["ACTCHECK_ROS_KEEPER"])
+            import actcheck_patches
+
+            actcheck_patches.install(module, os.environ["ACTCHECK_ROS_KEEPER"])
 
         spec.loader.exec_module = executed
         return spec
 
 
+def _sleep(seconds):
+    """Is `time.sleep` from the start, since a node may import it by name before rclpy."""
+    _sleep.kept(seconds)
+
+
 if os.environ.get("ACTCHECK_ROS_KEEPER"):
+    _sleep.kept = _sleep.native = time.sleep
+    time.sleep = _sleep
     sys.meta_path.insert(0, _AfterRclpy())
 _chain()
