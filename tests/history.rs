@@ -870,7 +870,7 @@ fn a_history_of_another_format_is_not_changed() {
     let (folder, history) = filled();
     drop(history);
     let dir = folder.path().join("history");
-    for (version, help) in [("7", "update actcheck"), ("5", "no release wrote")] {
+    for (version, help) in [("8", "update actcheck"), ("6", "no release wrote")] {
         std::fs::write(dir.join("VERSION"), format!("actcheck history {version}\n")).unwrap();
         for fault in [code(History::open(&dir)), code(History::open_to_read(&dir))] {
             assert!(
