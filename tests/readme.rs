@@ -20,7 +20,7 @@ fn the_pattern_of_the_readme_is_the_one_that_its_commands_print() {
     let readme = std::fs::read_to_string(root().join("README.md")).unwrap();
     let shown = blocks(&readme, "text")
         .into_iter()
-        .find(|block| block.contains("times as often as all runs"))
+        .find(|block| block.contains("held out"))
         .unwrap();
     let project = shipped_project();
     for arguments in blocks(&readme, "sh")

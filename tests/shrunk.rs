@@ -445,7 +445,7 @@ fn an_interrupt_while_a_campaign_shrinks_sets_the_exit_code() {
     let mut child = started(project.path(), &arguments);
     let mut out = BufReader::new(child.stdout.take().unwrap());
     let mut text = String::new();
-    while !text.contains("\ncampaign ") {
+    while !text.contains("; campaign ") {
         assert_ne!(out.read_line(&mut text).unwrap(), 0, "{text}");
     }
     interrupt(&child);
