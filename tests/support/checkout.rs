@@ -21,11 +21,13 @@ impl Checkout {
     pub fn fresh() -> Self {
         let project = project_with(COARSEST);
         let folder = project.path();
-        edit(
-            &folder.join("configs/pick.toml"),
-            "test_count = 15",
-            "test_count = 6",
-        );
+        for (config, count) in [("pick", 15), ("varied_light", 60)] {
+            edit(
+                &folder.join("configs").join(config).with_extension("toml"),
+                &format!("test_count = {count}"),
+                "test_count = 6",
+            );
+        }
         std::fs::copy(root().join("Makefile"), folder.join("Makefile")).unwrap();
         copy(&root().join("clients"), &folder.join("clients"));
         let episodes = "tests/data/episodes";
@@ -88,6 +90,7 @@ impl Checkout {
         // Long campaigns are for people.
         let commands = commands
             .replace("--runs 300", "--runs 12")
+            .replace("--runs 30 ", "--runs 6 ")
             .replace("--trials 40", "--trials 12")
             .replace(
                 "check-oracles configs/pick.toml",
