@@ -154,6 +154,15 @@ pub fn escaped(name: &str) -> String {
     out
 }
 
+/// Whether a text mentions a name as a whole word.
+pub fn mentions(text: &str, name: &str) -> bool {
+    let of_word = |c: char| c.is_alphanumeric() || c == '_';
+    !name.is_empty()
+        && text.match_indices(name).any(|(at, _)| {
+            !text[..at].ends_with(of_word) && !text[at + name.len()..].starts_with(of_word)
+        })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -209,5 +218,16 @@ mod tests {
         ] {
             assert_eq!(category(named), format!("{W}category/{label}"));
         }
+    }
+
+    #[test]
+    fn names_are_mentioned_as_whole_words_only() {
+        assert!(mentions("glass_1 is 57.5 cm from the gripper", "glass_1"));
+        assert!(mentions("touched (glass_1)", "glass_1"));
+        assert!(
+            !mentions("glass_12 fell", "glass_1")
+                && !mentions("a glass_1b", "glass_1")
+                && !mentions("x", "")
+        );
     }
 }

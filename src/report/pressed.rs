@@ -1,13 +1,13 @@
 //! The hardest contact of the robot with something that it is not to touch.
 
-use crate::moment::names;
+use actcheck_base::names::mentions;
 use actcheck_data::{ActionTrace, ContactEpisode, Trace};
 
 /// A contact with at least this force is shown even if no failure names it. Unit: newtons. It
 /// slides 14 kg of furniture with a friction coefficient of 0.5.
 const HARD_N: f64 = 70.0;
 /// The designator of the object that the robot may touch.
-const TARGET: &str = "pickObject";
+pub(super) const TARGET: &str = "pickObject";
 /// Prefix of the robot's links in traces.
 const LINK: &str = "robot/";
 
@@ -88,7 +88,7 @@ fn hardest(all: impl Iterator<Item = Pressed>) -> Option<Pressed> {
 
 /// Whether a text names the body, and of another link also the link itself.
 fn is_named(pressed: &Pressed, text: &str) -> bool {
-    names(text, &pressed.thing) && (names(text, &pressed.link) || !text.contains(" pressed "))
+    mentions(text, &pressed.thing) && (mentions(text, &pressed.link) || !text.contains(" pressed "))
 }
 
 /// All contacts of the robot during an action, except with the object that it may touch or holds,

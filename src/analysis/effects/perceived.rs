@@ -6,8 +6,9 @@ use crate::effects::ActionEffects;
 use crate::effects::action::target_of;
 use crate::effects::base::from_base;
 use actcheck_base::Outcome;
+use actcheck_base::names::mentions;
 use actcheck_data::{ActionTrace, BodyState, Look, Pose, RobotState, Trace};
-use actcheck_history::RunDetail;
+use actcheck_history::{ActionDetail, RunDetail};
 
 /// Tilt beyond which perception sees an object as its upright bounding box. Unit: radians.
 const LYING_RAD: f64 = 0.3;
@@ -179,8 +180,8 @@ fn foot(body: &BodyState) -> [f64; 3] {
 }
 
 /// Returns, for each action in which a property failed, the sentence about the perception of its
-/// target, by the action's position in the test (from 1). Actions without such an error are left
-/// out.
+/// target, by the action's position in the test (from 1). Left out are actions without such an
+/// error, and those whose failures are only about other objects.
 pub fn perceived_sentences(run: &RunDetail, trace: &Trace) -> BTreeMap<u32, String> {
     let failed = run.actions.iter().filter(|action| {
         action
@@ -192,10 +193,24 @@ pub fn perceived_sentences(run: &RunDetail, trace: &Trace) -> BTreeMap<u32, Stri
         .filter_map(|action| {
             let step = usize::try_from(action.step.checked_sub(1)?).ok()?;
             let target = &target_of(run, action)?.id;
+            if !is_about(run, action, target) {
+                return None;
+            }
             let error = ActionEffects::of(run, trace, step)?.perceived?;
             Some((action.step, error.sentence(target)?))
         })
         .collect()
+}
+
+/// Whether a failure of an action mentions an object, or no object at all.
+fn is_about(run: &RunDetail, action: &ActionDetail, id: &str) -> bool {
+    let objects = || run.objects.iter().map(|object| object.id.as_str());
+    action
+        .judgements
+        .iter()
+        .filter(|judgement| judgement.outcome == Outcome::Failed)
+        .map(|judgement| judgement.witness.as_str())
+        .any(|witness| mentions(witness, id) || !objects().any(|other| mentions(witness, other)))
 }
 
 #[cfg(test)]

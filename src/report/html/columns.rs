@@ -416,19 +416,37 @@ fn made_texts(texts: impl Iterator<Item = Option<String>>, pack: &mut Pack) -> V
     json!({ "kind": "texts", "texts": distinct, "of": of_run })
 }
 
-/// For each run, whether a property failed.
-fn failed_runs(table: &OutcomeTable) -> Vec<bool> {
+/// For each run, whether a property failed and its witness mentions the target, or no object at all.
+/// Failures that are only about other objects don't come from the perception of the target.
+fn failed_with_target(table: &OutcomeTable) -> Vec<bool> {
     let (runs, words) = (table.text("run"), table.text("outcome"));
     let mut failed = vec![false; runs.texts.len()];
     for (row, run) in runs.of_row.iter().enumerate() {
         if let Some(run) = run {
-            failed[*run as usize] |= words.get(row) == Some(Outcome::Failed.word());
+            failed[*run as usize] |=
+                words.get(row) == Some(Outcome::Failed.word()) && is_about_target(table, row);
         }
     }
     failed
 }
 
-/// The error with which the action of a row perceived its target, in words.
+/// Whether the witness of a row mentions the target, or no object at all. The id of an object is
+/// that of its model with a number.
+fn is_about_target(table: &OutcomeTable, row: usize) -> bool {
+    let witness = table.text("witness").get(row).unwrap_or_default();
+    let is_mentioned = |model: &str| witness.contains(&format!("{model}_"));
+    let mut models = table
+        .text("objects")
+        .get(row)
+        .unwrap_or_default()
+        .split(", ")
+        .filter_map(|item| item.split_once(" ("))
+        .map(|(model, _)| model);
+    table.text("target_model").get(row).is_none_or(is_mentioned) || !models.any(is_mentioned)
+}
+
+/// The error with which the action of a row perceived its target, in words: `target perceived 5 cm
+/// left of where it was`.
 fn perceived(table: &OutcomeTable, row: usize) -> Option<String> {
     let part = |name: &str| {
         let value = table.number(name).get(row).copied();
@@ -439,7 +457,7 @@ fn perceived(table: &OutcomeTable, row: usize) -> Option<String> {
         left_m: part("target_perceived_left_m")?,
         above_m: part("target_perceived_above_m")?,
     };
-    error.words()
+    Some(format!("target {}", error.words()?))
 }
 
 /// Packs the message and duration of each action, step by step, whether it reported success, and
@@ -458,7 +476,7 @@ fn steps(table: &OutcomeTable, pack: &mut Pack) {
             rows[*step as usize - 1][run as usize].get_or_insert(row);
         }
     }
-    let failed = failed_runs(table);
+    let failed = failed_with_target(table);
     let steps: Vec<Value> = rows
         .iter()
         .map(|rows| {

@@ -56,8 +56,9 @@ pub(super) const SCRIPT: [&str; 39] = [
 ];
 
 /// Scripts of the page of a comparison, in the same way.
-pub(super) const REVIEW_SCRIPT: [&str; 25] = [
+pub(super) const REVIEW_SCRIPT: [&str; 26] = [
     include_str!("web/dom.js"),
+    include_str!("web/sorted.js"),
     include_str!("web/unpack.js"),
     include_str!("web/words.js"),
     include_str!("web/outcomes.js"),
