@@ -96,17 +96,35 @@ fn a_change_is_reviewed_in_markdown_and_in_a_browser() {
     assert!(browser.complaints.is_empty(), "{:#?}", browser.complaints);
 }
 
-/// The common clock moves both replays, and so does the timeline of each.
+/// The common clock moves both replays, and so does a click on the timeline of each.
 fn moves_in_step(browser: &mut Chromium) {
-    let clocks = "[...document.querySelectorAll('.two .clock')].map((clock) => clock.textContent.split(' ')[0])";
-    browser.value(
-        "(() => { const slider = document.querySelector('.both > .controls .slider'); slider.value = 1.5; slider.dispatchEvent(new Event('input')); })()",
+    let marks = "[...document.querySelectorAll('.both .timeline .now')].map((mark) => Number(mark.getAttribute('x1')))";
+    let moved = |browser: &mut Chromium, before: &Value, how: &str| {
+        browser.value(how);
+        let after = browser.value(marks);
+        let pairs = || {
+            let both = before.as_array().unwrap().iter();
+            both.zip(after.as_array().unwrap())
+        };
+        assert_eq!(pairs().count(), 2, "{how}");
+        assert!(pairs().all(|(one, other)| one != other), "{how}: {after}");
+        after
+    };
+    let begun = browser.value(marks);
+    let slid = moved(
+        browser,
+        &begun,
+        "(() => { const slider = document.querySelector('.both .slider'); slider.value = 1.5; slider.dispatchEvent(new Event('input')); })()",
     );
-    assert_eq!(browser.value(clocks), json!(["1.5", "1.5"]));
-    browser.value(
-        "(() => { const slider = document.querySelector('.two .slider'); slider.value = 2.5; slider.dispatchEvent(new Event('input')); })()",
+    let clock = "document.querySelector('.both .clock').textContent.split(' ')[0]";
+    assert_eq!(browser.value(clock), json!("1.5"));
+    moved(
+        browser,
+        &slid,
+        "(() => { const at = [...document.querySelectorAll('.both .timeline')][1], { left, width, top } = at.getBoundingClientRect(); \
+         at.dispatchEvent(new MouseEvent('click', { clientX: left + 0.5 * width, clientY: top + 5 })); })()",
     );
-    assert_eq!(browser.value(clocks), json!(["2.5", "2.5"]));
+    assert_ne!(browser.value(clock), json!("1.5"));
 }
 
 #[test]

@@ -122,8 +122,7 @@ pub fn unclosed_braces(text: &str) -> Option<String> {
         }
         at += c.len_utf8();
     }
-    (open > closed)
-        .then(|| format!("a brace is not closed ({open} are opened, {closed} closed): add `}}`"))
+    (open > closed).then(|| format!("`{{` occurs {open} times, but `}}` {closed} times: add `}}`"))
 }
 
 #[cfg(test)]

@@ -1,7 +1,9 @@
 //! Ends a campaign whose runs break again and again, because further runs would say nothing about
 //! the robot.
 
-use actcheck_base::Diagnostic;
+use std::path::Path;
+
+use actcheck_base::{Diagnostic, ShellLine};
 use actcheck_config::Launcher;
 use actcheck_history::{RunRecord, RunStatus};
 
@@ -45,7 +47,7 @@ impl BrokenRuns {
     /// Counts a run. Returns the error that ends the campaign, if it has to end: `S033` if the
     /// program broke too many runs in a row, `S034` if all of the first runs were broken for the
     /// same reason.
-    pub(super) fn count(&mut self, run: &RunRecord) -> Option<Diagnostic> {
+    pub(super) fn count(&mut self, run: &RunRecord, history: &Path) -> Option<Diagnostic> {
         let reason = (run.status == RunStatus::Broken)
             .then(|| without_numbers(run.reason.as_deref().unwrap_or_default()));
         self.runs += 1;
@@ -61,9 +63,9 @@ impl BrokenRuns {
         };
         let all_alike = self.alike.is_some();
         match self.most {
-            Some(most) if self.in_a_row >= most => Some(too_many(most, run, all_alike)),
+            Some(most) if self.in_a_row >= most => Some(too_many(most, run, all_alike, history)),
             _ if self.in_a_row == 0 && all_alike && self.runs >= LEAST_ALIKE => {
-                Some(all_broken(run))
+                Some(all_broken(run, history))
             }
             _ => None,
         }
@@ -78,19 +80,19 @@ fn without_numbers(reason: &str) -> String {
         .collect()
 }
 
-fn all_broken(last: &RunRecord) -> Diagnostic {
+fn all_broken(last: &RunRecord, history: &Path) -> Diagnostic {
     let reason = last.reason.as_deref().unwrap_or_default();
     let message =
         format!("the first {LEAST_ALIKE} runs were all broken for the same reason: {reason}");
     Diagnostic::error("S034", message).help(format!(
-        "`actcheck show {}` shows one of them; further runs would end in the same way",
-        last.id
+        "`{}` shows one of them; further runs would end in the same way",
+        show(last, history)
     ))
 }
 
 /// The error of a campaign whose program broke `most` runs in a row. `alike`: all of its runs, for
 /// the same reason.
-fn too_many(most: u64, last: &RunRecord, alike: bool) -> Diagnostic {
+fn too_many(most: u64, last: &RunRecord, alike: bool, history: &Path) -> Diagnostic {
     let reason = last.reason.as_deref().unwrap_or_default();
     let (runs, which) = match (most, alike) {
         (1, _) => ("a run was".to_owned(), "; the last one, "),
@@ -104,8 +106,21 @@ fn too_many(most: u64, last: &RunRecord, alike: bool) -> Diagnostic {
         "{runs} broken by the program that performs actions{which}{}: {reason}",
         last.id
     );
+    let install = if reason.contains("No module named") {
+        "activate the Python environment that has the module before `actcheck run`, or name its Python in `test_launcher`; "
+    } else {
+        ""
+    };
     Diagnostic::error("S033", message).help(format!(
-        "`actcheck show {}` shows its output; `[skill] max_broken` is the allowed number of such runs in a row",
-        last.id
+        "{install}`{}` shows its output; `[skill] max_broken` is the allowed number of such runs in a row",
+        show(last, history)
     ))
+}
+
+/// The command that shows a run.
+fn show(run: &RunRecord, history: &Path) -> ShellLine {
+    ShellLine::default()
+        .fixed("actcheck show")
+        .word(&run.id)
+        .option("--history", history)
 }

@@ -299,7 +299,7 @@ impl<'a> RunWriter<'a> {
                     self.end.ending = Ending::Budget(spent);
                     return ControlFlow::Break(());
                 }
-                match self.broken.count(&record) {
+                match self.broken.count(&record, self.history.dir()) {
                     Some(fault) => {
                         self.stop(fault.into());
                         ControlFlow::Break(())

@@ -341,7 +341,11 @@ fn find_file(name: &str, path: PathBuf, args: Vec<String>) -> Result<Command, Mi
     if !path.is_file() {
         return Err(Missing {
             code: "C031",
-            message: format!("there is no file {}", path.display()),
+            message: if path.is_dir() {
+                format!("{} is a folder", path.display())
+            } else {
+                format!("there is no file {}", path.display())
+            },
             help: "the path of `test_launcher` is relative to the configuration".to_owned(),
         });
     }
@@ -358,9 +362,8 @@ fn find_file(name: &str, path: PathBuf, args: Vec<String>) -> Result<Command, Mi
                 code: "C032",
                 message: format!("{} is not executable", path.display()),
                 help: format!(
-                    "run `{}`, or name a program that runs it: `test_launcher = \"{}\"`",
+                    "run `{}`, or name the program that runs it before it in `test_launcher`",
                     ShellLine::default().fixed("chmod +x").file(name),
-                    ShellLine::default().fixed("sh").file(name)
                 ),
             });
         }

@@ -12,6 +12,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
+use nix::libc;
 use nix::sys::signal::{Signal, kill, killpg};
 use nix::unistd::Pid;
 
@@ -98,7 +99,7 @@ impl Process {
             .stderr(writer);
         let mut child = command
             .spawn()
-            .map_err(|error| cannot("it can't be started", &error))?;
+            .map_err(|error| not_started(&skill.program, &error))?;
         // The command also holds ends of the pipe.
         drop(command);
         let made = Output::read(reader).and_then(|output| Ok((guard(&child, folder)?, output)));
@@ -143,7 +144,7 @@ impl Process {
             }
             if let Some(how) = self.ended() {
                 return Err(broke(format!(
-                    "{how} before it connected to the address in ACTCHECK_ADDRESS"
+                    "{how} before it connected to the address in ACTCHECK_ADDRESS (in Python, `actcheck.serve()` connects)"
                 )));
             }
             if stop.load(Ordering::Relaxed) {
@@ -369,6 +370,20 @@ fn how(status: ExitStatus) -> String {
         },
         (None, None) => "it ended".to_owned(),
     }
+}
+
+/// Why the system refuses to start a file that exists and may be executed: its first line.
+fn not_started(program: &Path, error: &std::io::Error) -> ExternalFault {
+    let line = match error.kind() {
+        _ if error.raw_os_error() == Some(libc::ENOEXEC) => {
+            "its first line names no interpreter, such as `#!/usr/bin/env python3`"
+        }
+        ErrorKind::NotFound if program.is_file() => {
+            "the interpreter that its first line names does not exist"
+        }
+        _ => return cannot("it can't be started", error),
+    };
+    broke(format!("it can't be started: {line}"))
 }
 
 fn cannot(what: &str, error: &std::io::Error) -> ExternalFault {

@@ -173,7 +173,7 @@ impl CampaignSummary {
             ),
             Oddity::NeverPassed => format!(
                 "{names} never passed in {of} judgements (so in at most {most:.0} % of such scenes): \
-                 check its rule ({ask})"
+                 check its rule, and whether the action ever succeeds ({ask})"
             ),
             Oddity::NeverApplied => format!(
                 "{names} applied in none of {of} judgements: check `applicable` in its rule and the preconditions of its \

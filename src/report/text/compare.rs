@@ -310,10 +310,16 @@ fn alone(out: &mut String, summary: &CompareSummary) {
 fn answers(out: &mut String, summary: &CompareSummary) {
     let (level, margin) = (summary.answer_level(), summary.margin);
     if summary.comparison.is_same {
-        let runs = summary.sides[0].runs;
+        let [a, b] = &summary.sides;
+        let one = if a.campaign == b.campaign && a.started == b.started {
+            "; they are one campaign"
+        } else {
+            ""
+        };
         let _ = writeln!(
             out,
-            "\nanswer: same: all {runs} runs have the same states and outcomes in A and B"
+            "\nanswer: same: all {} runs have the same states and outcomes in A and B{one}",
+            a.runs
         );
         return;
     }

@@ -139,7 +139,7 @@ class Pair {
       for (const action of replay?.actions ?? []) {
         const there = (judged) => other.find((one) => one.step === action.step && one.property === local(judged.property))?.outcome;
         const flipped = action.judged.find((judged) => judged.outcome === "failed" && there(judged) !== "failed");
-        if (flipped) return flipped.pressed && replay.pressed ? replay.pressed.secs[0] : flipped.stated;
+        if (flipped) return flipped.pressed && replay.pressed ? replay.pressed.secs[0] : flipped.decided ?? flipped.stated;
       }
     }
     return null;

@@ -72,9 +72,10 @@ def is_stale(folder: Path) -> bool:
 
 
 def make(folder: Path) -> None:
-    """Makes an environment, or does nothing if it is complete. Raises `EnvironmentFault`."""
+    """Makes an environment, unless it is complete. Raises `EnvironmentFault`."""
     folder = folder.absolute()
     if is_made(folder):
+        _link(folder)
         return
     if sys.platform != "linux" or sys.version_info < (3, 11):
         raise EnvironmentFault(
@@ -89,10 +90,16 @@ def make(folder: Path) -> None:
     pip = [str(python), "-m", "pip", "install", "--quiet", "--no-deps", "--disable-pip-version-check"]
     _run("installing the wheels", [*pip, "-r", str(HERE / "pins.txt")])
     _rewrite(folder)
-    # The same package as the one that runs now, wherever it is.
-    (_site(folder) / "actcheck").symlink_to(HERE.parent.absolute())
     _build(folder)
+    _link(folder)
     (folder / STAMP).write_text(stamp())
+
+
+def _link(folder: Path) -> None:
+    """Lets the environment find the same package as the one that runs now, wherever it was before."""
+    link = _site(folder) / "actcheck"
+    link.unlink(missing_ok=True)
+    link.symlink_to(HERE.parent.absolute())
 
 
 def _rewrite(folder: Path) -> None:
