@@ -122,7 +122,7 @@ pub fn unclosed_braces(text: &str) -> Option<String> {
         }
         at += c.len_utf8();
     }
-    (open > closed).then(|| format!("`{{` occurs {open} times, but `}}` {closed} times: add `}}`"))
+    (open > closed).then(|| format!("it has {open} `{{` and {closed} `}}`: add `}}`"))
 }
 
 #[cfg(test)]

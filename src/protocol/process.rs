@@ -143,8 +143,14 @@ impl Process {
                 Err(error) => return Err(cannot("its connection can't be accepted", &error)),
             }
             if let Some(how) = self.ended() {
+                // A program without a fault that ends has probably forgotten to connect.
+                let hint = if how.ends_with(" code 0") {
+                    " (in Python, `actcheck.serve()` connects)"
+                } else {
+                    ""
+                };
                 return Err(broke(format!(
-                    "{how} before it connected to the address in ACTCHECK_ADDRESS (in Python, `actcheck.serve()` connects)"
+                    "{how} before it connected to the address in ACTCHECK_ADDRESS{hint}"
                 )));
             }
             if stop.load(Ordering::Relaxed) {

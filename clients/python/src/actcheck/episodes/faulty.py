@@ -71,7 +71,7 @@ class Stage:
         """The nearest movable body that is neither the object nor its goal."""
         others = self.scene.others(self.aim.object, self.aim.target)
         if not others:
-            raise NotPossible("the scene has no other movable object")
+            raise NotPossible("the scene has no movable object besides the object and its goal")
         return others[0]
 
     def pick(self) -> Hand:
