@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from actcheck import Aborted, Failed, Pose, ProtocolFault, Report, Robot, Thing, serve
+from actcheck import Aborted, Failed, Pose, ProtocolFault, Report, Robot, Thing, Unreachable, serve
 from actcheck import skill as skill_for
 from actcheck.session import Session
 from actcheck.skill import skills
@@ -60,7 +60,7 @@ class Serving(unittest.TestCase):
         def pick(robot: Robot, **designators: Any) -> Report:
             return Report(False, str(sorted(designators.items())))
 
-        self.assertEqual(self.ends(pick)[0]["message"], "[('pickObject', 'obj:glass_1')]")
+        self.assertEqual(self.ends(pick)[0]["message"], "[('pickObject', 'obj:glass_1'), ('surfaceObjects', 'obj:cup')]")
 
     def test_what_a_skill_returns_or_raises_is_how_it_ended(self) -> None:
         glass = Thing("x", Pose.upright((1.0, 2.0, 3.0)), np.array([0.1, 0.1, 0.2]), "act:Glass")
@@ -211,7 +211,7 @@ class Hands(unittest.TestCase):
         cases: list[tuple[Callable[[], Any], str]] = [
             (lambda: self.robot.gripper(80), "the opening of the gripper is 80 m, but must be from 0 to .* m; its unit is m: 80 mm are 0.08 m"),
             (lambda: self.robot.gripper(-0.1), "the opening of the gripper is -0.1 m, but must be from 0 to"),
-            (lambda: self.robot.gripper(0.0, force_n=-5.0), "the force of a finger is -5 N, but must be at least 0 N"),
+            (lambda: self.robot.gripper(0.0, force_n=-5.0), "the force of a finger is -5 N, but must be from 0 to 100 N"),
             (lambda: self.robot.move_joints({"wrist_flex_joint": 45}), "wrist_flex_joint is 45 rad, but .* 45 ° are 0.7854 rad"),
             (lambda: self.robot.move_joints({"arm_lift_joint": 30}), "the position of arm_lift_joint is 30 m, .* 30 cm are 0.3 m"),
             (lambda: self.robot.step(velocities={"arm_lift_joint": 50.0}), f"velocity of arm_lift_joint is 50 m/s, but must be from -{lift.velocity:.4g} to"),
@@ -220,13 +220,60 @@ class Hands(unittest.TestCase):
             (lambda: self.robot.step(base_velocity=(0.1, 0.0)), "has 3 numbers"),
             (lambda: self.robot.step(head=(0.0, 40.0)), "head_tilt_joint is 40 rad, but"),
             (lambda: self.robot.gripper(math.nan), "is nan, but must be finite"),
+            (lambda: self.robot.gripper(0.0, force_n=9999.0), "the force of a finger is 9999 N, but must be from 0 to 100 N"),
+            (lambda: self.robot.wait(-1.0), "the time to wait is -1 s, but must be at least 0 s"),
+            (lambda: self.robot.wait(math.nan), "the time to wait is nan, but must be finite"),
+            (lambda: self.robot.move_joints(LEVEL, seconds=-1.0), "the duration is -1 s"),
+            (lambda: self.robot.drive(-1.0, 0.0, 90.0), "the heading is 90 rad, but .*; its unit is rad: 90 ° are 1.571 rad"),
+            (lambda: self.robot.drive(-1000.0, 0.0, 0.0), "x of the base is -1000 m, .* -1000 mm are -1 m"),
+            (lambda: Pose.pointing((1.0, 0.0, 0.8), 0.0, down=90.0), "the angle down is 90 rad, but .* 90 ° are 1.571 rad"),
+            (lambda: Pose.pointing((1.0, 0.0, 0.8), heading=-45.0), "the heading is -45 rad, but .* -45 ° are -0.7854 rad"),
+            (lambda: Pose.upright((1.0, 0.0, 0.8), yaw=180.0), "the yaw is 180 rad, but"),
+            (lambda: self.robot.step({"arm_lift_joint": 0.1}, ticks=0), "`ticks` is 0, but must be at least 1"),
         ]
         for command, words in cases:
             with self.assertRaisesRegex(ValueError, words):
                 command()
         self.assertEqual(self.commands(), [])
+        self.assertEqual(self.robot.wait(-0.005).time_s, 0.0, "a rounding error is not refused")
         self.robot.step({"arm_lift_joint": lift.upper + 0.005})
         self.assertEqual(len(self.commands()), 1, "a rounding error is not refused")
+
+    def test_a_target_pose_that_no_scene_has_is_refused(self) -> None:
+        for move in (self.robot.ik, self.robot.move_straight):
+            cases: list[tuple[Any, type[Exception], str]] = [
+                (Pose.upright((math.nan, 0.0, 0.8)), ValueError, "x of the pose is nan, but must be finite"),
+                (Pose(np.zeros(3), np.full((3, 3), math.nan)), ValueError, "the rotation of the pose must be finite"),
+                (Pose.upright((0.3, 0.1)), ValueError, "a pose has 3 coordinates"),
+                (Pose.upright((300.0, 100.0, 800.0)), ValueError, "x of the pose is 300 m, .*; its unit is m: .* and 300 mm are 0.3 m"),
+                ([1.0, 0.0, 0.8], TypeError, "a target must be a Pose, such as .*, not list"),
+            ]
+            for pose, kind, words in cases:
+                with self.assertRaisesRegex(kind, words):
+                    move(pose)
+        with self.assertRaisesRegex(TypeError, "integer"):
+            self.robot.step(ticks=1.5)  # type: ignore[arg-type]
+        self.assertEqual(self.commands(), [])
+
+    def test_an_unreachable_pose_is_named_with_the_closest_solution(self) -> None:
+        high = Pose.pointing((1.0, 0.2, 3.0), 0.0)
+        closest = r"the closest solution is \d\d+\.\d cm and .*° off; at their limits: .*arm_lift_joint"
+        with self.assertRaisesRegex(Unreachable, rf"can't reach \(1.00, 0.20, 3.00\): {closest}"):
+            self.robot.ik(high)
+        hand = self.robot.fk()
+        with self.assertRaisesRegex(Unreachable, r"no straight way to \(1.00, 0.20, 3.00\): the hand can't reach \("):
+            self.robot.move_straight(high)
+        turned = Pose.pointing(hand.position, hand.yaw + math.pi / 2)
+        with self.assertRaisesRegex(Unreachable, r"cm and [1-9]\d*\.\d° off"):
+            self.robot.ik(turned, base=False)
+
+    def test_an_object_that_is_not_named_anywhere_is_a_mistake_of_the_skill(self) -> None:
+        words = r"'glass_1' is known \(did you mean `obj:glass_1`\?\); known ids: obj:cup, obj:glass_1, obj:table"
+        with self.assertRaisesRegex(ValueError, words):
+            self.robot.look_for("glass_1")
+        for of in (None, ["obj:glass_1"]):
+            with self.assertRaisesRegex(TypeError, "`look_for` takes the id of one object"):
+                self.robot.look_for(of)  # type: ignore[arg-type]
 
     def test_fingers_close_until_they_stall(self) -> None:
         self.assertAlmostEqual(self.robot.gripper(0.135).opening_m, 0.135, 3)
