@@ -5,7 +5,10 @@ from __future__ import annotations
 import contextlib
 import io
 import math
+import sys
+import time
 import unittest
+import unittest.mock
 from collections.abc import Callable
 from typing import Any
 
@@ -30,6 +33,7 @@ class Serving(unittest.TestCase):
 
     def ends(self, function: Callable[..., Any], script: Script = one_action) -> list[Message]:
         """The final messages that the simulation received from a served skill."""
+        skills.clear()
         skill_for("Pick")(function)
         simulation = Simulation(script)
         self.errors = io.StringIO()
@@ -93,8 +97,96 @@ class Serving(unittest.TestCase):
         with self.assertRaisesRegex(SystemExit, r"ValueError: .*'tentacle_joint'.*\(test_skill.py, line \d+: robot.step"):
             self.ends(pick)
         self.assertIn("Traceback", self.errors.getvalue())
-        with self.assertRaisesRegex(SystemExit, "returns a Report, a bool or None, not int"):
-            self.ends(lambda robot: 7)
+        self.assertNotIn("actcheck/skill.py", self.errors.getvalue(), "the traceback begins at the skill")
+
+    def test_a_function_that_does_not_fit_its_action_is_named_with_its_line(self) -> None:
+        def misspelt(robot: Robot, pick_object: str | None = None) -> bool:
+            return True
+
+        def missing(robot: Robot, target: str) -> bool:
+            return True
+
+        cases: list[tuple[Callable[..., Any], str]] = [
+            (misspelt, r"misspelt\(\) takes `pick_object`, but Pick has `pickObject`, `surfaceObjects` \(test_skill.py, line \d+\)"),
+            (missing, r"missing\(\) takes `target`, but Pick has"),
+            (lambda robot: 7, r"must return a Report, a bool or None, not int \(test_skill.py, line \d+\)"),
+            (lambda robot: robot.feels, r"not method; write `feels\(\)`"),
+        ]
+        for function, words in cases:
+            with self.assertRaisesRegex(SystemExit, f"^TypeError: .*{words}"):
+                self.ends(function)
+            self.assertEqual(self.errors.getvalue(), "", "without a traceback, which would show this package only")
+
+        def with_option(robot: Robot, *, speed: float = 0.3) -> bool:
+            return speed == 0.3
+
+        self.assertTrue(self.ends(with_option)[0]["succeeded"])
+
+    def test_a_function_that_can_not_be_a_skill_is_refused_when_it_is_defined(self) -> None:
+        async def waits(robot: Robot) -> None:
+            pass
+
+        def yields(robot: Robot) -> Any:
+            yield
+
+        class Skills:
+            def pick(self, robot: Robot) -> None:
+                pass
+
+        cases: list[tuple[Any, str]] = [
+            (waits, r"waits\(\) must not be `async`: .* \(test_skill.py, line \d+\)"),
+            (yields, r"yields\(\) must not `yield`"),
+            (Skills.pick, r"pick\(\) must not be a method"),
+            (lambda: True, "must take the robot first"),
+            ("Pick", "a skill must be a function, not a str"),
+        ]
+        for function, words in cases:
+            with self.assertRaisesRegex(TypeError, words):
+                skill_for("Pick")(function)
+        with self.assertRaisesRegex(TypeError, r'needs the name of an action in brackets: `@actcheck.skill\("Pick"\)`'):
+            skill_for(lambda robot: True)  # type: ignore[arg-type]
+        skill_for("Pick")(Skills().pick)
+        with self.assertRaisesRegex(TypeError, r"is a second skill for Pick; the first is pick\(\) in test_skill.py, line \d+"):
+            skill_for("Pick")(lambda robot: True)
+        skills.clear()
+        with self.assertRaisesRegex(SystemExit, r"no skill is defined before `serve\(\)`"):
+            serve("test", Simulation(one_action).wire)
+
+    def test_a_report_is_checked_where_it_is_made(self) -> None:
+        glass = Thing("", Pose.upright((math.nan, 0.0, 0.0)), np.ones(3))
+        cases: list[tuple[Callable[[], Any], str]] = [
+            (lambda: Report("no"), "succeeded in a Report must be True or False, not 'no'"),  # type: ignore[arg-type]
+            (lambda: Report(True, {"a": 1}), "message in a Report must be a text, not {'a': 1}"),  # type: ignore[arg-type]
+            (lambda: Report(True, "", glass), "perceived in a Report must be a list of Things"),  # type: ignore[arg-type]
+            (lambda: Report(True, "", [1]), "an element of perceived in a Report must be a Thing, not 1"),  # type: ignore[list-item]
+            (lambda: Report(True, held=glass), "held in a Report must be a Held or None"),  # type: ignore[arg-type]
+            (lambda: Report(True, "", [glass]), "the pose and the size of a Thing in a Report must be finite"),
+        ]
+        for report, words in cases:
+            with self.assertRaisesRegex((TypeError, ValueError), words):
+                report()
+        self.assertIs(Report(np.bool_(True)).succeeded, True)  # type: ignore[arg-type]
+        self.assertEqual([self.ends(lambda robot, *, end=np.bool_(it): end)[0]["succeeded"] for it in (1, 0)], [True, False])
+
+    def test_a_skill_that_ends_the_program_is_named(self) -> None:
+        def pick(robot: Robot) -> None:
+            sys.exit(0)
+
+        with self.assertRaisesRegex(SystemExit, r"must return a report instead of ending the program \(test_skill.py, line \d+: sys.exit"):
+            self.ends(pick)
+
+    def test_a_silent_program_prints_its_line_before_its_time_is_over(self) -> None:
+        def pick(robot: Robot) -> None:
+            time.sleep(0.6)  # too long
+            robot.wait(0.1)
+            time.sleep(0.2)
+            robot.wait(0.1)
+
+        with unittest.mock.patch.dict("os.environ", ACTCHECK_TIMEOUT_S="0.4"):
+            self.ends(pick)
+        printed = self.errors.getvalue()
+        self.assertRegex(printed, r"the program has sent no message for 0.36 s; it is at test_skill.py, line \d+: time.sleep\(0.6\)  # too long")
+        self.assertEqual(printed.count("no message"), 1, "only if it is silent for too long, and once")
 
     def test_an_aborted_action_is_over_even_for_a_skill_that_catches_everything(self) -> None:
         tries: list[str] = []
@@ -119,6 +211,17 @@ class Serving(unittest.TestCase):
 
         self.assertEqual(self.ends(pick, script), [{"type": "aborted"}])
         self.assertEqual(tries, ["budget"] * 3)
+
+    def test_a_refusal_is_printed_with_the_line_of_the_skill(self) -> None:
+        def script(simulation: Simulation) -> None:
+            simulation.greet()
+            simulation.reset()
+            simulation.begin()
+            simulation.receive("command")
+            simulation.send({"type": "error", "reason": "its command is wrong"})
+
+        with self.assertRaisesRegex(SystemExit, r"refused a message of test_skill.py, line \d+: .*robot.wait\(0.1\).*: its command is wrong"):
+            self.ends(lambda robot: robot.wait(0.1), script)
 
     def test_another_version_and_a_refusal_end_the_program_with_a_sentence(self) -> None:
         def other_version(simulation: Simulation) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Any
 
-from actcheck.faults import Aborted, Closed, ProtocolFault
+from actcheck.faults import Aborted, Closed, ProtocolFault, Refused
 from actcheck.messages import PROTOCOL, Call, Observation, Report, RobotDescription
 from actcheck.wire import Message, Wire
 
@@ -100,7 +100,7 @@ class Session:
             self._aborted = Aborted(str(message.get("reason", "no reason was given")))
             raise self._aborted
         if kind == "error":
-            raise ProtocolFault(f"actcheck refused a message: {message.get('reason', 'no reason was given')}")
+            raise Refused(str(message.get("reason", "no reason was given")))
         if kind == "bye":
             raise Closed("actcheck ended the connection")
         raise ProtocolFault(f"received `{kind}`, expected {' or '.join(due)}")
