@@ -15,6 +15,8 @@ from actcheck.wire import Message
 
 #: Protocol version of this package.
 PROTOCOL = 1
+#: Longest message of a report. Unit: characters.
+LONGEST_MESSAGE = 100_000
 
 
 @dataclass(frozen=True)
@@ -328,6 +330,8 @@ class Report:
         _check_type("succeeded", self.succeeded, "True or False", bool, np.bool_)
         object.__setattr__(self, "succeeded", bool(self.succeeded))
         _check_type("message", self.message, "a text", str)
+        if len(self.message) > LONGEST_MESSAGE:
+            raise ValueError(f"the message in a Report has {len(self.message)} characters, but must have at most {LONGEST_MESSAGE}")
         _check_type("perceived", self.perceived, "a list of Things", Sequence)
         for thing in self.perceived:
             _check_type("an element of perceived", thing, "a Thing", Thing)

@@ -273,7 +273,7 @@ class Robot:
         if of in known:
             raise Failed(f"{of} was not seen")
         near = "".join(f" (did you mean `{one}`?)" for one in difflib.get_close_matches(of, known, 1))
-        raise ValueError(f"no object with the id {of!r} is known{near}; known ids: {', '.join(sorted(known))}")
+        raise ValueError(f"unknown object {of!r}{near}; known: {', '.join(sorted(known))}")
 
     # The end.
 

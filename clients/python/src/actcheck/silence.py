@@ -10,7 +10,7 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from actcheck.traces import line_of, own_frames
+from actcheck.traces import own_frames, place_of
 from actcheck.wire import Wire
 
 #: `[skill] timeout_s` of the campaign, if actcheck does not pass it on. Unit: seconds.
@@ -53,6 +53,6 @@ def _report(thread: int, limit_s: float) -> None:
     if frame is None:
         return
     frames = own_frames(traceback.extract_stack(frame))
-    place = f"; it is at {line_of(frames[-1])}" if frames else ""
+    place = f"; it is in {place_of(frames[-1])}: {frames[-1].line}" if frames else ""
     lines = ["Stack (most recent call last):\n", *traceback.format_list(frames)]
     print("".join(lines) + f"the program has sent no message for {limit_s:g} s{place}", file=sys.stderr, flush=True)

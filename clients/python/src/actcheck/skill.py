@@ -17,7 +17,7 @@ from actcheck.messages import Call, Report
 from actcheck.robot import Ended, Robot
 from actcheck.session import Session
 from actcheck.silence import watched
-from actcheck.traces import line_of_definition, line_of_fault, print_traceback
+from actcheck.traces import place_of_definition, place_of_fault, print_traceback
 from actcheck.wire import Wire
 
 #: A skill takes the robot and, as keyword arguments, any of the action's designators.
@@ -33,8 +33,8 @@ class Unfit(TypeError):
     """A function can't be a skill, or not the skill of its action. The message names the line of its definition."""
 
     def __init__(self, function: Callable[..., Any], words: str) -> None:
-        place = line_of_definition(function)
-        super().__init__(f"{_name(function)} {words}" + (f" ({place})" if place else ""))
+        self.words, self.place = f"{_name(function)} {words}", place_of_definition(function)
+        super().__init__(f"{self.words} ({self.place})" if self.place else self.words)
 
 
 def skill(action: str) -> Callable[[_Skill], _Skill]:
@@ -51,8 +51,8 @@ def skill(action: str) -> Callable[[_Skill], _Skill]:
 
     def register(function: _Skill) -> _Skill:
         _check(function)
-        place, other = line_of_definition(function), skills.get(action)
-        before = line_of_definition(other) if other is not None else None
+        place, other = place_of_definition(function), skills.get(action)
+        before = place_of_definition(other) if other is not None else None
         if before is not None and before != place and _file(other) == _file(function):
             raise Unfit(function, f"is a second skill for {action}; the first is {_name(other)} in {before}")
         skills[action] = function
@@ -70,7 +70,7 @@ def serve(name: str | None = None, wire: Wire | None = None) -> None:
     if not skills:
         sys.exit('actcheck: no skill is defined before `serve()`: write `@actcheck.skill("Pick")` above a function, `serve()` below it')
     # The line of a crash in native code.
-    faulthandler.enable(_STANDARD_ERROR)
+    faulthandler.enable(_STANDARD_ERROR, all_threads=False)
     name = name or Path(sys.argv[0]).stem or "python"
     try:
         wire = wire or Wire.from_environment()
@@ -90,8 +90,13 @@ def serve(name: str | None = None, wire: Wire | None = None) -> None:
                     sys.exit(summary(fault))
                 session.end(report)
     except Refused as fault:
-        place = line_of_fault(fault)
-        sys.exit(f"actcheck refused a message{f' of {place}' if place else ''}: {fault}")
+        place = place_of_fault(fault)
+        if place:
+            print_traceback(fault)
+        else:
+            print(f"actcheck: {fault}", file=sys.stderr)
+        # actcheck adds the last line to its own reason, so it does not repeat it.
+        sys.exit(f"actcheck refused a message in {place}" if place else "actcheck refused a message")
     except ProtocolFault as fault:
         sys.exit(f"actcheck: {fault}")
 
@@ -137,13 +142,16 @@ def report_of(function: Skill, returned: object) -> Report:
 
 
 def summary(fault: BaseException) -> str:
-    """An exception in one line: its message, and the innermost line of code outside this package."""
-    words, place = f"{type(fault).__name__}: {fault}", line_of_fault(fault)
+    """An exception in one line: its type, the innermost line of code outside this package, and its message.
+
+    The place comes before the message, because actcheck shortens long lines.
+    """
+    kind, words, place = type(fault).__name__, str(fault), place_of_fault(fault)
     if isinstance(fault, Unfit):
-        return f"TypeError: {fault}"
+        kind, words, place = "TypeError", fault.words, fault.place
     if isinstance(fault, SystemExit):
-        words = "SystemExit: a skill must return a report instead of ending the program"
-    return f"{words} ({place})" if place else words
+        words = "a skill must return a report instead of ending the program"
+    return f"{kind} in {place}: {words}" if place else f"{kind}: {words}"
 
 
 def _check(function: Callable[..., Any]) -> None:

@@ -15,22 +15,26 @@ _PACKAGE = str(Path(__file__).parent)
 
 
 def own_frames(frames: Iterable[traceback.FrameSummary]) -> list[traceback.FrameSummary]:
-    """The frames of the user's own files: outside of this package and of installed packages."""
-    return [frame for frame in frames if not frame.filename.startswith(_PACKAGE) and "/site-packages/" not in frame.filename]
+    """The frames of the user's own files: outside of this package and of installed packages, and not of generated code."""
+    return [
+        frame
+        for frame in frames
+        if frame.line and not frame.filename.startswith(_PACKAGE) and "/site-packages/" not in frame.filename
+    ]
 
 
-def line_of(frame: traceback.FrameSummary) -> str:
-    """A frame's file, line number and line."""
-    return f"{Path(frame.filename).name}, line {frame.lineno}: {(frame.line or '').strip()}"
+def place_of(frame: traceback.FrameSummary) -> str:
+    """A frame's file and line number."""
+    return f"{Path(frame.filename).name}, line {frame.lineno}"
 
 
-def line_of_fault(fault: BaseException) -> str | None:
+def place_of_fault(fault: BaseException) -> str | None:
     """The innermost of the user's own lines in an exception's traceback; `None` if there are none."""
     frames = own_frames(traceback.extract_tb(fault.__traceback__))
-    return line_of(frames[-1]) if frames else None
+    return place_of(frames[-1]) if frames else None
 
 
-def line_of_definition(function: Callable[..., Any]) -> str | None:
+def place_of_definition(function: Callable[..., Any]) -> str | None:
     """The file and the line of a function's `def`; `None` if it has none."""
     function = inspect.unwrap(function)
     while isinstance(function, functools.partial):
