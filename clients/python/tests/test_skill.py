@@ -360,6 +360,10 @@ class Hands(unittest.TestCase):
             for pose, kind, words in cases:
                 with self.assertRaisesRegex(kind, words):
                     move(pose)
+        with self.assertRaisesRegex(ValueError, "the position of wrist_flex_joint is nan"):
+            self.robot.ik(Pose.upright((1.0, 0.0, 0.8)), near={"wrist_flex_joint": math.nan})
+        with self.assertRaisesRegex(ValueError, "no joint 'wrist'"):
+            self.robot.fk({"wrist": 0.0})
         with self.assertRaisesRegex(TypeError, "integer"):
             self.robot.step(ticks=1.5)  # type: ignore[arg-type]
         self.assertEqual(self.commands(), [])

@@ -132,7 +132,7 @@ class Robot:
         if message["ticks"] < 1:
             raise ValueError(f"`ticks` is {ticks}, but must be at least 1")
         if positions is not None:
-            message["positions"] = named = self._checked(self._named(positions), "position")
+            message["positions"] = named = self._checked(positions, "position")
             self.commanded.update(named)
         if velocities is not None:
             message["velocities"] = self._checked(velocities, "velocity")
@@ -168,7 +168,7 @@ class Robot:
         Joints that a waypoint does not name keep their targets. The motion stops early when `until` returns true.
         """
         within("the duration", seconds, (0.0, math.inf), "s")
-        way = [self._checked(self._named(waypoint), "position") for waypoint in waypoints]
+        way = [self._checked(waypoint, "position") for waypoint in waypoints]
         names = list(dict.fromkeys(name for waypoint in way for name in waypoint))
         points = [[self.commanded[name] for name in names]]
         for waypoint in way:
@@ -314,24 +314,28 @@ class Robot:
         miss = pose.position - chain.pose(seed).position
         return seed | {x: seed[x] + float(miss[0]), y: seed[y] + float(miss[1])}
 
-    def _named(self, joints: Joints) -> dict[str, float]:
-        if isinstance(joints, Mapping):
-            return dict(joints)
-        names = self.description.arm_joints
-        if len(joints) != len(names):
-            raise ValueError(f"{len(joints)} positions were given for the {len(names)} joints of the arm")
-        return {name: float(value) for name, value in zip(names, joints)}
-
-    def _checked(self, values: Mapping[str, Any], what: str) -> dict[str, float]:
-        checked = {}
-        for name, value in values.items():
+    def _named(self, joints: Joints, what: str = "position") -> dict[str, float]:
+        """Numbers by joint. Raises `ValueError` for an unknown joint and for a number that is not finite."""
+        if not isinstance(joints, Mapping):
+            names = self.description.arm_joints
+            if len(joints) != len(names):
+                raise ValueError(f"{len(joints)} positions were given for the {len(names)} joints of the arm")
+            joints = dict(zip(names, joints))
+        named = {}
+        for name, value in joints.items():
             if name not in self._numbers:
                 raise ValueError(f"the robot has no joint {name!r}; it has {', '.join(self._numbers)}")
-            checked[name] = number = float(value)
+            named[name] = number = float(value)
             if not math.isfinite(number):
                 raise ValueError(f"the {what} of {name} is {number}, but must be finite")
+        return named
+
+    def _checked(self, values: Joints, what: str) -> dict[str, float]:
+        """As `_named`, but also raises `ValueError` for a number beyond the joint's limits."""
+        named = self._named(values, what)
+        for name, number in named.items():
             self._check_limit(self.description.joints[self._numbers[name]], what, number)
-        return checked
+        return named
 
     def _check_limit(self, joint: Joint, what: str, number: float) -> None:
         """Raises `ValueError` if a target of a joint is beyond its limits."""
