@@ -36,7 +36,7 @@ def on_plane(image: RgbImage, column: float, row: float, height_m: float) -> np.
 @skill("Pick")
 def pick(robot: Robot, pickObject: str) -> Report:
     robot.move_joints(dict(zip(robot.description.head_joints, (0.0, TILT_RAD))))
-    robot.wait(LOOK_S - robot.observe().time_s)
+    robot.wait(max(0.0, LOOK_S - robot.observe().time_s))
     image = robot.image()
     if "--look" in sys.argv:
         return Report(False, "it only looked")

@@ -154,7 +154,7 @@ class Simulation:
         }
 
     def begin(self, **parameters: Any) -> None:
-        values = parameters or {"pickObject": "obj:glass_1"}
+        values = parameters or {"pickObject": ["obj:glass_1"], "surfaceObjects": ["obj:cup"]}
         message = {"type": "begin", "action": "Pick", "parameters": values, "kinds": {}, "budget_s": 60.0}
         self.send(message | {"observation": self.observation()})
 

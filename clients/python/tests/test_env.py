@@ -26,7 +26,8 @@ class Environment(unittest.TestCase):
         session = Session(simulation.wire, "test", ["Pick"])
         env = ActionEnv("Pick", reward=lambda robot: -robot.observe().time_s, session=session)
         seen, info = env.reset()
-        self.assertEqual(info, {"action": "Pick", "parameters": {"pickObject": "obj:glass_1"}, "run": "k7f3-1", "seed": 5})
+        parameters = {"pickObject": "obj:glass_1", "surfaceObjects": "obj:cup"}
+        self.assertEqual(info, {"action": "Pick", "parameters": parameters, "run": "k7f3-1", "seed": 5})
         assert env.observation_space is not None
         self.assertTrue(env.observation_space.contains(seen))
         self.assertEqual(env.action_space.shape, (len(ARM) + 3 + 1,))

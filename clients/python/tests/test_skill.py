@@ -5,13 +5,16 @@ from __future__ import annotations
 import contextlib
 import io
 import math
+import sys
+import time
 import unittest
+import unittest.mock
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from actcheck import Aborted, Failed, Pose, ProtocolFault, Report, Robot, Thing, serve
+from actcheck import Aborted, Failed, Pose, ProtocolFault, Report, Robot, Thing, Unreachable, serve
 from actcheck import skill as skill_for
 from actcheck.session import Session
 from actcheck.skill import skills
@@ -30,6 +33,7 @@ class Serving(unittest.TestCase):
 
     def ends(self, function: Callable[..., Any], script: Script = one_action) -> list[Message]:
         """The final messages that the simulation received from a served skill."""
+        skills.clear()
         skill_for("Pick")(function)
         simulation = Simulation(script)
         self.errors = io.StringIO()
@@ -60,7 +64,7 @@ class Serving(unittest.TestCase):
         def pick(robot: Robot, **designators: Any) -> Report:
             return Report(False, str(sorted(designators.items())))
 
-        self.assertEqual(self.ends(pick)[0]["message"], "[('pickObject', 'obj:glass_1')]")
+        self.assertEqual(self.ends(pick)[0]["message"], "[('pickObject', 'obj:glass_1'), ('surfaceObjects', 'obj:cup')]")
 
     def test_what_a_skill_returns_or_raises_is_how_it_ended(self) -> None:
         glass = Thing("x", Pose.upright((1.0, 2.0, 3.0)), np.array([0.1, 0.1, 0.2]), "act:Glass")
@@ -90,11 +94,102 @@ class Serving(unittest.TestCase):
         def pick(robot: Robot) -> None:
             robot.step({"tentacle_joint": 1.0})
 
-        with self.assertRaisesRegex(SystemExit, r"ValueError: .*'tentacle_joint'.*\(test_skill.py, line \d+: robot.step"):
+        with self.assertRaisesRegex(SystemExit, r"^ValueError in test_skill.py, line \d+: .*'tentacle_joint'"):
             self.ends(pick)
         self.assertIn("Traceback", self.errors.getvalue())
-        with self.assertRaisesRegex(SystemExit, "returns a Report, a bool or None, not int"):
-            self.ends(lambda robot: 7)
+        self.assertNotIn("actcheck/skill.py", self.errors.getvalue(), "the traceback begins at the skill")
+
+    def test_a_function_that_does_not_fit_its_action_is_named_with_its_line(self) -> None:
+        def misspelt(robot: Robot, pick_object: str | None = None) -> bool:
+            return True
+
+        def missing(robot: Robot, target: str) -> bool:
+            return True
+
+        cases: list[tuple[Callable[..., Any], str]] = [
+            (misspelt, r"misspelt\(\) takes `pick_object`, but Pick has `pickObject`, `surfaceObjects`$"),
+            (missing, r"missing\(\) takes `target`, but Pick has"),
+            (lambda robot: 7, r"must return a Report, a bool or None, not int"),
+            (lambda robot: robot.feels, r"not method; write `feels\(\)`"),
+        ]
+        for function, words in cases:
+            with self.assertRaisesRegex(SystemExit, rf"^TypeError in test_skill.py, line \d+: .*{words}"):
+                self.ends(function)
+            self.assertEqual(self.errors.getvalue(), "", "without a traceback, which would show this package only")
+
+        def with_option(robot: Robot, *, speed: float = 0.3) -> bool:
+            return speed == 0.3
+
+        self.assertTrue(self.ends(with_option)[0]["succeeded"])
+
+    def test_a_function_that_can_not_be_a_skill_is_refused_when_it_is_defined(self) -> None:
+        async def waits(robot: Robot) -> None:
+            pass
+
+        def yields(robot: Robot) -> Any:
+            yield
+
+        class Skills:
+            def pick(self, robot: Robot) -> None:
+                pass
+
+        cases: list[tuple[Any, str]] = [
+            (waits, r"waits\(\) must not be `async`: .* \(test_skill.py, line \d+\)"),
+            (yields, r"yields\(\) must not `yield`"),
+            (Skills.pick, r"pick\(\) must not be a method"),
+            (lambda: True, "must take the robot first"),
+            ("Pick", "a skill must be a function, not a str"),
+        ]
+        for function, words in cases:
+            with self.assertRaisesRegex(TypeError, words):
+                skill_for("Pick")(function)
+        with self.assertRaisesRegex(TypeError, r'needs the name of an action in brackets: `@actcheck.skill\("Pick"\)`'):
+            skill_for(lambda robot: True)  # type: ignore[arg-type]
+        skill_for("Pick")(Skills().pick)
+        with self.assertRaisesRegex(TypeError, r"is a second skill for Pick; the first is pick\(\) in test_skill.py, line \d+"):
+            skill_for("Pick")(lambda robot: True)
+        skills.clear()
+        with self.assertRaisesRegex(SystemExit, r"no skill is defined before `serve\(\)`"):
+            serve("test")
+
+    def test_a_report_is_checked_where_it_is_made(self) -> None:
+        glass = Thing("", Pose.upright((math.nan, 0.0, 0.0)), np.ones(3))
+        cases: list[tuple[Callable[[], Any], str]] = [
+            (lambda: Report("no"), "succeeded in a Report must be True or False, not 'no'"),  # type: ignore[arg-type]
+            (lambda: Report(True, {"a": 1}), "message in a Report must be a text, not {'a': 1}"),  # type: ignore[arg-type]
+            (lambda: Report(True, "", glass), "perceived in a Report must be a list of Things"),  # type: ignore[arg-type]
+            (lambda: Report(True, "", [1]), "an element of perceived in a Report must be a Thing, not 1"),  # type: ignore[list-item]
+            (lambda: Report(True, held=glass), "held in a Report must be a Held or None"),  # type: ignore[arg-type]
+            (lambda: Report(True, "a" * 1_000_000), "has 1000000 characters, but must have at most"),
+            (lambda: Report(True, "", [glass]), "the pose and the size of a Thing in a Report must be finite"),
+        ]
+        for report, words in cases:
+            with self.assertRaisesRegex((TypeError, ValueError), words):
+                report()
+        with self.assertRaisesRegex(SystemExit, r"^TypeError in test_skill.py, line \d+: succeeded"):
+            self.ends(lambda robot: Report("no"))  # type: ignore[arg-type]
+        self.assertIs(Report(np.bool_(True)).succeeded, True)  # type: ignore[arg-type]
+        self.assertEqual([self.ends(lambda robot, *, end=np.bool_(it): end)[0]["succeeded"] for it in (1, 0)], [True, False])
+
+    def test_a_skill_that_ends_the_program_is_named(self) -> None:
+        def pick(robot: Robot) -> None:
+            sys.exit(0)
+
+        with self.assertRaisesRegex(SystemExit, r"^SystemExit in test_skill.py, line \d+: a skill must return a report"):
+            self.ends(pick)
+
+    def test_a_silent_program_prints_its_line_before_its_time_is_over(self) -> None:
+        def pick(robot: Robot) -> None:
+            time.sleep(0.6)  # too long
+            robot.wait(0.1)
+            time.sleep(0.2)
+            robot.wait(0.1)
+
+        with unittest.mock.patch.dict("os.environ", ACTCHECK_TIMEOUT_S="0.4"):
+            self.ends(pick)
+        printed = self.errors.getvalue()
+        self.assertRegex(printed, r"the program has sent no message for 0.36 s; it is in test_skill.py, line \d+: time.sleep\(0.6\)  # too long")
+        self.assertEqual(printed.count("no message"), 1, "only if it is silent for too long, and once")
 
     def test_an_aborted_action_is_over_even_for_a_skill_that_catches_everything(self) -> None:
         tries: list[str] = []
@@ -120,6 +215,18 @@ class Serving(unittest.TestCase):
         self.assertEqual(self.ends(pick, script), [{"type": "aborted"}])
         self.assertEqual(tries, ["budget"] * 3)
 
+    def test_a_refusal_is_printed_with_the_line_of_the_skill(self) -> None:
+        def script(simulation: Simulation) -> None:
+            simulation.greet()
+            simulation.reset()
+            simulation.begin()
+            simulation.receive("command")
+            simulation.send({"type": "error", "reason": "its command is wrong"})
+
+        with self.assertRaisesRegex(SystemExit, r"^actcheck refused a message in test_skill.py, line \d+$"):
+            self.ends(lambda robot: robot.wait(0.1), script)
+        self.assertIn("Refused: its command is wrong", self.errors.getvalue())
+
     def test_another_version_and_a_refusal_end_the_program_with_a_sentence(self) -> None:
         def other_version(simulation: Simulation) -> None:
             simulation.send(hello(protocol=7))
@@ -128,9 +235,11 @@ class Serving(unittest.TestCase):
             simulation.greet()
             simulation.send({"type": "error", "reason": "unknown key"})
 
-        for script, words in ((other_version, "version 7"), (refusal, "unknown key"), (lambda simulation: None, "closed")):
+        for script, words in ((other_version, "version 7"), (refusal, "refused a message"), (lambda simulation: None, "closed")):
             with self.assertRaisesRegex(SystemExit, words):
                 self.ends(lambda robot: None, script)
+            if script is refusal:
+                self.assertEqual(self.errors.getvalue(), "actcheck: unknown key\n")
 
     def test_a_message_that_is_not_due_is_told(self) -> None:
         def script(simulation: Simulation) -> None:
@@ -211,7 +320,7 @@ class Hands(unittest.TestCase):
         cases: list[tuple[Callable[[], Any], str]] = [
             (lambda: self.robot.gripper(80), "the opening of the gripper is 80 m, but must be from 0 to .* m; its unit is m: 80 mm are 0.08 m"),
             (lambda: self.robot.gripper(-0.1), "the opening of the gripper is -0.1 m, but must be from 0 to"),
-            (lambda: self.robot.gripper(0.0, force_n=-5.0), "the force of a finger is -5 N, but must be at least 0 N"),
+            (lambda: self.robot.gripper(0.0, force_n=-5.0), "the force of a finger is -5 N, but must be from 0 to 100 N"),
             (lambda: self.robot.move_joints({"wrist_flex_joint": 45}), "wrist_flex_joint is 45 rad, but .* 45 ° are 0.7854 rad"),
             (lambda: self.robot.move_joints({"arm_lift_joint": 30}), "the position of arm_lift_joint is 30 m, .* 30 cm are 0.3 m"),
             (lambda: self.robot.step(velocities={"arm_lift_joint": 50.0}), f"velocity of arm_lift_joint is 50 m/s, but must be from -{lift.velocity:.4g} to"),
@@ -220,13 +329,64 @@ class Hands(unittest.TestCase):
             (lambda: self.robot.step(base_velocity=(0.1, 0.0)), "has 3 numbers"),
             (lambda: self.robot.step(head=(0.0, 40.0)), "head_tilt_joint is 40 rad, but"),
             (lambda: self.robot.gripper(math.nan), "is nan, but must be finite"),
+            (lambda: self.robot.gripper(0.0, force_n=9999.0), "the force of a finger is 9999 N, but must be from 0 to 100 N"),
+            (lambda: self.robot.wait(-1.0), "the time to wait is -1 s, but must be at least 0 s"),
+            (lambda: self.robot.wait(math.nan), "the time to wait is nan, but must be finite"),
+            (lambda: self.robot.move_joints(LEVEL, seconds=-1.0), "the duration is -1 s"),
+            (lambda: self.robot.drive(-1.0, 0.0, 90.0), "the heading is 90 rad, but .*; its unit is rad: 90 ° are 1.571 rad"),
+            (lambda: self.robot.drive(-1000.0, 0.0, 0.0), "x of the base is -1000 m, .* -1000 mm are -1 m"),
+            (lambda: Pose.pointing((1.0, 0.0, 0.8), 0.0, down=90.0), "the angle down is 90 rad, but .* 90 ° are 1.571 rad"),
+            (lambda: Pose.pointing((1.0, 0.0, 0.8), heading=-45.0), "the heading is -45 rad, but .* -45 ° are -0.7854 rad"),
+            (lambda: Pose.upright((1.0, 0.0, 0.8), yaw=180.0), "the yaw is 180 rad, but"),
+            (lambda: self.robot.step({"arm_lift_joint": 0.1}, ticks=0), "`ticks` is 0, but must be at least 1"),
         ]
         for command, words in cases:
             with self.assertRaisesRegex(ValueError, words):
                 command()
         self.assertEqual(self.commands(), [])
+        self.assertEqual(self.robot.wait(-0.005).time_s, 0.0, "a rounding error is not refused")
         self.robot.step({"arm_lift_joint": lift.upper + 0.005})
         self.assertEqual(len(self.commands()), 1, "a rounding error is not refused")
+
+    def test_a_target_pose_that_no_scene_has_is_refused(self) -> None:
+        for move in (self.robot.ik, self.robot.move_straight):
+            cases: list[tuple[Any, type[Exception], str]] = [
+                (Pose.upright((math.nan, 0.0, 0.8)), ValueError, "x of the pose is nan, but must be finite"),
+                (Pose(np.zeros(3), np.full((3, 3), math.nan)), ValueError, "the rotation of the pose must be finite"),
+                (Pose.upright((0.3, 0.1)), ValueError, "a pose has 3 coordinates"),
+                (Pose.upright((300.0, 100.0, 800.0)), ValueError, "x of the pose is 300 m, .*; its unit is m: .* and 300 mm are 0.3 m"),
+                ([1.0, 0.0, 0.8], TypeError, "a target must be a Pose, such as .*, not list"),
+            ]
+            for pose, kind, words in cases:
+                with self.assertRaisesRegex(kind, words):
+                    move(pose)
+        with self.assertRaisesRegex(ValueError, "the position of wrist_flex_joint is nan"):
+            self.robot.ik(Pose.upright((1.0, 0.0, 0.8)), near={"wrist_flex_joint": math.nan})
+        with self.assertRaisesRegex(ValueError, "no joint 'wrist'"):
+            self.robot.fk({"wrist": 0.0})
+        with self.assertRaisesRegex(TypeError, "integer"):
+            self.robot.step(ticks=1.5)  # type: ignore[arg-type]
+        self.assertEqual(self.commands(), [])
+
+    def test_an_unreachable_pose_is_named_with_the_closest_solution(self) -> None:
+        high = Pose.pointing((1.0, 0.2, 3.0), 0.0)
+        closest = r"the closest solution is \d\d+\.\d cm and .*° off; at their limits: .*arm_lift_joint"
+        with self.assertRaisesRegex(Unreachable, rf"can't reach \(1.00, 0.20, 3.00\): {closest}"):
+            self.robot.ik(high)
+        hand = self.robot.fk()
+        with self.assertRaisesRegex(Unreachable, r"no straight way to \(1.00, 0.20, 3.00\): the hand can't reach \("):
+            self.robot.move_straight(high)
+        turned = Pose.pointing(hand.position, hand.yaw + math.pi / 2)
+        with self.assertRaisesRegex(Unreachable, r"cm and [1-9]\d*\.\d° off"):
+            self.robot.ik(turned, base=False)
+
+    def test_an_object_that_is_not_named_anywhere_is_a_mistake_of_the_skill(self) -> None:
+        words = r"unknown object 'glass_1' \(did you mean `obj:glass_1`\?\); known: obj:cup, obj:glass_1, obj:table"
+        with self.assertRaisesRegex(ValueError, words):
+            self.robot.look_for("glass_1")
+        for of in (None, ["obj:glass_1"]):
+            with self.assertRaisesRegex(TypeError, "`look_for` takes the id of one object"):
+                self.robot.look_for(of)  # type: ignore[arg-type]
 
     def test_fingers_close_until_they_stall(self) -> None:
         self.assertAlmostEqual(self.robot.gripper(0.135).opening_m, 0.135, 3)

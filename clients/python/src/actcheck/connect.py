@@ -116,7 +116,7 @@ class Connection:
         robot = self.begin()
         report = Report(False, "the skill raised an exception")
         try:
-            report = report_of(function(robot, **wanted(function, robot.call)))
+            report = report_of(function, function(robot, **wanted(function, robot.call)))
         except Ended as ended:
             report = ended.report
         except Aborted as aborted:

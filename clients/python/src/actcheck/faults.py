@@ -29,6 +29,10 @@ class ProtocolFault(Exception):
     """Either side violated the protocol: actcheck sent an invalid message, or rejected one of this program's."""
 
 
+class Refused(ProtocolFault):
+    """actcheck refused a message of this program; the text is its reason."""
+
+
 class Closed(ProtocolFault):
     """actcheck closed the connection, or can't be reached."""
 

@@ -191,27 +191,33 @@ class Chain:
         Damped least squares; a joint that reaches its limit is fixed there and the rest is solved again. Raises `Unreachable`.
         """
         free = np.array([0.0 if name in held else 1.0 for name in self.names])
-        nearest = math.inf
+        misses: list[tuple[tuple[float, float], Vector]] = []
         for seed in seeds:
             start = np.clip([seed.get(name, 0.0) for name in self.names], self.lower, self.upper)
             found, miss = self._descend(target, np.asarray(start, dtype=np.float64), free)
-            if found is not None:
+            if miss is None:
                 return dict(zip(self.names, found.tolist()))
-            nearest = min(nearest, miss)
-        place = ", ".join(f"{value:.2f}" for value in target.position)
-        raise Unreachable(f"the hand can't reach ({place}): the closest solution is {nearest * 100:.1f} cm off")
+            misses.append((miss, found))
+        (metres, angle), found = min(misses, key=lambda one: one[0][0] / REACHED_M + one[0][1] / REACHED_RAD)
+        stuck = (free > 0) & ((found <= self.lower + AT_LIMIT) | (found >= self.upper - AT_LIMIT))
+        limits = ", ".join(name for name, at_limit in zip(self.names, stuck) if at_limit)
+        raise Unreachable(
+            f"the hand can't reach {target}: the closest solution is {metres * 100:.1f} cm and {math.degrees(angle):.1f}° off"
+            + (f"; at their limits: {limits}" if limits else "")
+        )
 
-    def _descend(self, target: Pose, positions: Vector, free: Vector) -> tuple[Vector | None, float]:
+    def _descend(self, target: Pose, positions: Vector, free: Vector) -> tuple[Vector, tuple[float, float] | None]:
+        """The last positions and, unless they reach the target, their distance and angle from it."""
         error = np.zeros(6)
         for _ in range(MOST_ITERATIONS):
             pose, jacobian = self.jacobian(positions)
             error[:3] = target.position - pose[:3, 3]
             error[3:] = turn_between(pose[:3, :3], target.rotation)
-            miss = math.hypot(*error[:3])
-            if miss < REACHED_M and math.hypot(*error[3:]) < REACHED_RAD:
-                return positions, miss
+            miss, reached = (math.hypot(*error[:3]), math.hypot(*error[3:])), positions
+            if miss[0] < REACHED_M and miss[1] < REACHED_RAD:
+                return positions, None
             positions = self._step(positions, jacobian, error, free.copy())
-        return None, miss
+        return reached, miss
 
     def _step(self, positions: Vector, jacobian: Matrix, error: Vector, free: Vector) -> Vector:
         for _ in range(len(positions) + 1):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from actcheck.wire import Message
 
 #: Protocol version of this package.
 PROTOCOL = 1
+#: Longest message of a report. Unit: characters.
+LONGEST_MESSAGE = 100_000
 
 
 @dataclass(frozen=True)
@@ -232,6 +235,12 @@ class Held:
         return {"pose": self.pose.to_wire(), "size_m": [float(side) for side in self.size_m]}
 
 
+def _check_type(name: str, value: object, words: str, *kinds: type) -> None:
+    """Raises `TypeError` if an argument of a report has another type."""
+    if not isinstance(value, kinds):
+        raise TypeError(f"{name} in a Report must be {words}, not {value!r:.60}")
+
+
 def things_from_wire(sent: Sequence[Message]) -> tuple[Thing, ...]:
     """Converts all objects of an answer message."""
     return tuple(Thing.from_wire(one) for one in sent)
@@ -315,6 +324,22 @@ class Report:
     plane: Plane | None = None
     #: The object in the hand, for later actions. Without it, an object that the fingers feel is assumed to be the `pickObject`.
     held: Held | None = None
+
+    def __post_init__(self) -> None:
+        """Raises `TypeError` or `ValueError` where the report is made, instead of later, where it is sent."""
+        _check_type("succeeded", self.succeeded, "True or False", bool, np.bool_)
+        object.__setattr__(self, "succeeded", bool(self.succeeded))
+        _check_type("message", self.message, "a text", str)
+        if len(self.message) > LONGEST_MESSAGE:
+            raise ValueError(f"the message in a Report has {len(self.message)} characters, but must have at most {LONGEST_MESSAGE}")
+        _check_type("perceived", self.perceived, "a list of Things", Sequence)
+        for thing in self.perceived:
+            _check_type("an element of perceived", thing, "a Thing", Thing)
+        _check_type("plane", self.plane, "a Plane or None", Plane, NoneType)
+        _check_type("held", self.held, "a Held or None", Held, NoneType)
+        for one in (*self.perceived, self.plane, self.held):
+            if one is not None and not np.isfinite([*one.pose.position, *one.pose.rotation.flat, *one.size_m]).all():
+                raise ValueError(f"the pose and the size of a {type(one).__name__} in a Report must be finite")
 
     def to_wire(self) -> Message:
         """Converts to an `end` message."""

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from actcheck.limits import LARGEST_ANGLE, LARGEST_HEADING, within
+
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
@@ -25,6 +27,7 @@ class Pose:
     @classmethod
     def upright(cls, position: ArrayLike, yaw: float = 0.0) -> Pose:
         """A pose at a position with a yaw in radians."""
+        within("the yaw", yaw, (-LARGEST_HEADING, LARGEST_HEADING), "rad")
         sin, cos = math.sin(yaw), math.cos(yaw)
         rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
         return cls(np.asarray(position, dtype=np.float64), rotation)
@@ -35,6 +38,8 @@ class Pose:
 
         Suits a hand whose fingers point along x and are side by side along y; `down=math.pi / 2` points straight down.
         """
+        within("the heading", heading, (-LARGEST_HEADING, LARGEST_HEADING), "rad")
+        within("the angle down", down, (-LARGEST_ANGLE, LARGEST_ANGLE), "rad")
         sin, cos = math.sin(heading), math.cos(heading)
         forward = np.array([cos * math.cos(down), sin * math.cos(down), -math.sin(down)])
         left = np.array([-sin, cos, 0.0])
@@ -102,6 +107,9 @@ class Pose:
     def ahead(self, metres: float) -> Pose:
         """The pose translated along its own x axis."""
         return Pose(self.position + self.rotation[:, 0] * metres, self.rotation)
+
+    def __str__(self) -> str:
+        return f"({', '.join(f'{value:.2f}' for value in self.position)})"
 
     def __mul__(self, inner: Pose) -> Pose:
         return Pose(self.position + self.rotation @ inner.position, self.rotation @ inner.rotation)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import difflib
 import math
+import operator
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from actcheck.faults import Failed
+from actcheck.faults import Failed, Unreachable
 from actcheck.kinematics import Chain, UrdfJoint, on_base, read_urdf, rotation
+from actcheck.limits import FARTHEST_M, LARGEST_ANGLE, within
 from actcheck.messages import (
     Call,
     DepthImage,
@@ -40,10 +43,6 @@ STALLED_TICKS = 10
 FELT_SHARE = 0.7
 #: Longest time for the fingers to move. Unit: seconds.
 LONGEST_GRIP_S = 2.5
-
-
-#: Targets beyond a limit by less than this share of it, or by less than this distance, are rounding errors.
-SLACK_SHARE, SLACK = 0.01, 0.01
 
 
 class Ended(BaseException):
@@ -92,8 +91,10 @@ class Robot:
         """Positions of the arm and, unless `base` is false, of the base that bring the tool to a pose. Raises `Unreachable`.
 
         The search starts from `near` if it is given, otherwise from the postures of the robot's profile, then from the current
-        posture. If the start does not include a base pose, the base is placed so that the hand is over the target.
+        posture. If the start does not include a base pose, the base is placed so that the hand is over the target. Collisions
+        are ignored, also those of the robot with itself.
         """
+        check_pose(pose)
         chain = self._chain(link or self.description.tool_link)
         movable = set(self.description.arm_joints) | (set(self.description.base_joints) if base else set())
         now = self.joints()
@@ -127,9 +128,11 @@ class Robot:
         the base's frame; `gripper` as the gap between the fingers (metres), or as gap and force (newtons); `head` as pan and
         tilt (radians), `None` for one that keeps its target.
         """
-        message: Message = {"type": "command", "ticks": ticks}
+        message: Message = {"type": "command", "ticks": operator.index(ticks)}
+        if message["ticks"] < 1:
+            raise ValueError(f"`ticks` is {ticks}, but must be at least 1")
         if positions is not None:
-            message["positions"] = named = self._checked(self._named(positions), "position")
+            message["positions"] = named = self._checked(positions, "position")
             self.commanded.update(named)
         if velocities is not None:
             message["velocities"] = self._checked(velocities, "velocity")
@@ -144,11 +147,13 @@ class Robot:
             pan, tilt = head
             turned = dict(zip(("pan_rad", "tilt_rad"), (pan, tilt)))
             message["head"] = {name: float(angle) for name, angle in turned.items() if angle is not None}
-            self._checked({joint: angle for joint, angle in zip(self.description.head_joints, (pan, tilt)) if angle is not None}, "position")
+            targets = zip(self.description.head_joints, (pan, tilt))
+            self._checked({joint: angle for joint, angle in targets if angle is not None}, "position")
         return self._command(message)
 
     def wait(self, seconds: float) -> Observation:
         """Waits for a simulated time."""
+        within("the time to wait", seconds, (0.0, math.inf), "s")
         ticks = math.ceil(seconds / self.tick_s - 1e-9)
         return self._command({"type": "command", "ticks": ticks}) if ticks > 0 else self._observation
 
@@ -162,7 +167,8 @@ class Robot:
 
         Joints that a waypoint does not name keep their targets. The motion stops early when `until` returns true.
         """
-        way = [self._checked(self._named(waypoint), "position") for waypoint in waypoints]
+        within("the duration", seconds, (0.0, math.inf), "s")
+        way = [self._checked(waypoint, "position") for waypoint in waypoints]
         names = list(dict.fromkeys(name for waypoint in way for name in waypoint))
         points = [[self.commanded[name] for name in names]]
         for waypoint in way:
@@ -183,21 +189,31 @@ class Robot:
 
     def move_straight(self, *poses: Pose, seconds: float = 0.0, step_m: float = 0.03, base: bool = False) -> Observation:
         """Moves the tool to poses along straight lines from its commanded pose. Raises `Unreachable`."""
+        for pose in poses:
+            check_pose(pose)
         joints, start, way = dict(self.commanded), self.fk(self.commanded), []
         for pose in poses:
             pieces = max(1, math.ceil(float(np.linalg.norm(pose.position - start.position)) / step_m))
             for piece in range(1, pieces + 1):
                 place = start.position + (pose.position - start.position) * (piece / pieces)
-                joints |= self.ik(Pose(place, pose.rotation), near=joints, base=base)
+                try:
+                    joints |= self.ik(Pose(place, pose.rotation), near=joints, base=base)
+                except Unreachable as fault:
+                    raise Unreachable(f"no straight way to {pose}: {fault}") from fault
                 way.append(dict(joints))
             start = pose
         movable = (*self.description.base_joints, *self.description.arm_joints)
         return self.follow([{name: at[name] for name in movable} for at in way], seconds)
 
     def drive(self, x: float, y: float, heading: float, seconds: float = 0.0) -> Observation:
-        """Drives straight to a pose, turning on the way. Frame: world, by the robot's belief."""
+        """Drives straight to a pose, turning on the way. Frame: world, by the robot's belief. Units: metres, radians."""
         names = self.description.base_joints
-        turned = self.commanded[names[2]] + wrapped(heading - self.commanded[names[2]])
+        for name, value in (("x", x), ("y", y)):
+            within(f"{name} of the base", value, (-FARTHEST_M, FARTHEST_M), "m")
+        now = self.commanded[names[2]]
+        # A heading may continue the turns that the base has made.
+        within("the heading", heading, (min(0.0, now) - LARGEST_ANGLE, max(0.0, now) + LARGEST_ANGLE), "rad")
+        turned = now + wrapped(heading - now)
         return self.follow([dict(zip(names, (x, y, turned)))], seconds)
 
     def base_velocity(self, forward: float, left: float = 0.0, turn: float = 0.0, *, ticks: int = 1) -> Observation:
@@ -239,14 +255,25 @@ class Robot:
 
     def objects(self, of: str | None = None) -> tuple[Thing, ...]:
         """Objects from the reference perception, with its errors: all, or only the one with this id."""
-        return things_from_wire(self._session.ask("objects", of)["objects"])
+        things = things_from_wire(self._session.ask("objects", of)["objects"])
+        self._session.ids.update(thing.id for thing in things)
+        return things
 
     def look_for(self, of: str) -> tuple[Thing, list[Thing]]:
-        """One object from the reference perception, and all others. Raises `Failed` if it is not seen."""
+        """One object from the reference perception, and all others. Raises `Failed` if it is not seen.
+
+        Raises `ValueError` for an id that neither the action nor the perception has named in this run.
+        """
+        if not isinstance(of, str):
+            raise TypeError(f"`look_for` takes the id of one object, such as the value of `pickObject`, not {of!r}")
         seen = {thing.id: thing for thing in self.objects()}
-        if of not in seen:
+        if of in seen:
+            return seen.pop(of), list(seen.values())
+        known = self._session.ids
+        if of in known:
             raise Failed(f"{of} was not seen")
-        return seen.pop(of), list(seen.values())
+        near = "".join(f" (did you mean `{one}`?)" for one in difflib.get_close_matches(of, known, 1))
+        raise ValueError(f"unknown object {of!r}{near}; known: {', '.join(sorted(known))}")
 
     # The end.
 
@@ -271,7 +298,7 @@ class Robot:
             if not self.description.base_joints:
                 observation = self.call.observation
                 x, y, heading = observation.base
-                root = Pose.upright((x, y, observation.root_height_m), heading)
+                root = Pose.upright((x, y, observation.root_height_m), wrapped(heading))
             if link == self.description.tool_link:
                 tip = Pose(tip.position, rotation(*self.description.tool_turned_rad))
             self._chains[link] = Chain(self._urdf, link, root, tip)
@@ -287,24 +314,28 @@ class Robot:
         miss = pose.position - chain.pose(seed).position
         return seed | {x: seed[x] + float(miss[0]), y: seed[y] + float(miss[1])}
 
-    def _named(self, joints: Joints) -> dict[str, float]:
-        if isinstance(joints, Mapping):
-            return dict(joints)
-        names = self.description.arm_joints
-        if len(joints) != len(names):
-            raise ValueError(f"{len(joints)} positions were given for the {len(names)} joints of the arm")
-        return {name: float(value) for name, value in zip(names, joints)}
-
-    def _checked(self, values: Mapping[str, Any], what: str) -> dict[str, float]:
-        checked = {}
-        for name, value in values.items():
+    def _named(self, joints: Joints, what: str = "position") -> dict[str, float]:
+        """Numbers by joint. Raises `ValueError` for an unknown joint and for a number that is not finite."""
+        if not isinstance(joints, Mapping):
+            names = self.description.arm_joints
+            if len(joints) != len(names):
+                raise ValueError(f"{len(joints)} positions were given for the {len(names)} joints of the arm")
+            joints = dict(zip(names, joints))
+        named = {}
+        for name, value in joints.items():
             if name not in self._numbers:
                 raise ValueError(f"the robot has no joint {name!r}; it has {', '.join(self._numbers)}")
-            checked[name] = number = float(value)
+            named[name] = number = float(value)
             if not math.isfinite(number):
                 raise ValueError(f"the {what} of {name} is {number}, but must be finite")
+        return named
+
+    def _checked(self, values: Joints, what: str) -> dict[str, float]:
+        """As `_named`, but also raises `ValueError` for a number beyond the joint's limits."""
+        named = self._named(values, what)
+        for name, number in named.items():
             self._check_limit(self.description.joints[self._numbers[name]], what, number)
-        return checked
+        return named
 
     def _check_limit(self, joint: Joint, what: str, number: float) -> None:
         """Raises `ValueError` if a target of a joint is beyond its limits."""
@@ -328,19 +359,20 @@ class Robot:
         return opening
 
     def _checked_force(self, force_n: float) -> float:
-        within("the force of a finger", force := float(force_n), (0.0, math.inf), "N")
+        fingers = [self.description.joints[self._numbers[name]] for name in self.description.gripper_joints]
+        slide = fingers and all(joint.kind == "prismatic" for joint in fingers)
+        most = max(self.description.grip_force_n, *(joint.effort for joint in fingers)) if slide else math.inf
+        within("the force of a finger", force := float(force_n), (0.0, most), "N")
         return force
 
 
-def within(name: str, number: float, limits: tuple[float, float], unit: str) -> None:
-    """Raises `ValueError` if a target is beyond its limits: with the name, the unit, the limits, and the likely mistake."""
-    low, high = limits
-    if not math.isfinite(number):
-        raise ValueError(f"{name} is {number}, but must be finite")
-    if low - max(SLACK, SLACK_SHARE * abs(low)) <= number <= high + max(SLACK, SLACK_SHARE * abs(high)):
-        return
-    allowed = f"from {low:.4g} to {high:.4g} {unit}" if high < 1e300 else f"at least {low:.4g} {unit}"
-    others = {"m": (("cm", 0.01), ("mm", 0.001)), "rad": (("°", math.pi / 180.0),)}.get(unit, ())
-    meant = [f"{number:g} {other} are {number * factor:.4g} {unit}" for other, factor in others if low <= number * factor <= high]
-    remedy = f"; its unit is {unit}: {' and '.join(meant)}" if meant else ""
-    raise ValueError(f"{name} is {number:g} {unit}, but must be {allowed}{remedy}")
+def check_pose(pose: Pose) -> None:
+    """Raises `TypeError` or `ValueError` unless it is a finite pose within the size of a scene."""
+    if not isinstance(pose, Pose):
+        raise TypeError(f"a target must be a Pose, such as `Pose.pointing(position, heading)`, not {type(pose).__name__}")
+    if pose.position.shape != (3,) or pose.rotation.shape != (3, 3):
+        raise ValueError(f"a pose has 3 coordinates and a 3 × 3 rotation, not {pose.position.shape} and {pose.rotation.shape}")
+    if not np.isfinite(pose.rotation).all():
+        raise ValueError("the rotation of the pose must be finite")
+    for axis, coordinate in zip("xyz", pose.position.tolist()):
+        within(f"{axis} of the pose", coordinate, (-FARTHEST_M, FARTHEST_M), "m")

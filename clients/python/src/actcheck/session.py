@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Any
 
-from actcheck.faults import Aborted, Closed, ProtocolFault
+from actcheck.faults import Aborted, Closed, ProtocolFault, Refused
 from actcheck.messages import PROTOCOL, Call, Observation, Report, RobotDescription
 from actcheck.wire import Message, Wire
 
@@ -24,6 +24,8 @@ class Session:
             raise ProtocolFault(f"actcheck uses protocol version {hello.get('protocol')}, this package version {PROTOCOL}")
         self.description = RobotDescription.from_wire(hello)
         self._run, self._seed, self._index = "", 0, 0
+        #: Ids that the actions and the perception have named in this run.
+        self.ids: set[str] = set()
         self._aborted: Aborted | None = None
         wire.send({"type": "hello", "protocol": PROTOCOL, "name": name, "actions": actions})
 
@@ -45,11 +47,13 @@ class Session:
                 self._on_reset()
                 self._run, self._seed = str(message["run"]), int(message["seed"])
                 self._index = int(message.get("index", 0))
+                self.ids.clear()
                 self._wire.send({"type": "ready"})
                 continue
             self._aborted = None
             sent = message["observation"]
             truth = {"truth": message["truth"]} if message.get("truth") else {}
+            self.ids.update(_texts(message["parameters"].values()))
             return Call(
                 action=message["action"],
                 parameters={name: _single(value) for name, value in message["parameters"].items()},
@@ -96,10 +100,16 @@ class Session:
             self._aborted = Aborted(str(message.get("reason", "no reason was given")))
             raise self._aborted
         if kind == "error":
-            raise ProtocolFault(f"actcheck refused a message: {message.get('reason', 'no reason was given')}")
+            raise Refused(str(message.get("reason", "no reason was given")))
         if kind == "bye":
             raise Closed("actcheck ended the connection")
         raise ProtocolFault(f"received `{kind}`, expected {' or '.join(due)}")
+
+
+def _texts(values: Iterable[Any]) -> list[str]:
+    """All texts among values and lists of values."""
+    lists = (value if isinstance(value, list) else [value] for value in values)
+    return [one for some in lists for one in some if isinstance(one, str)]
 
 
 def _single(value: Any) -> Any:

@@ -9,6 +9,7 @@ import json
 import os
 import socket
 import struct
+import time
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,8 @@ class Wire:
     def __init__(self, connection: socket.socket) -> None:
         self._socket = connection
         self._buffer = bytearray()
+        #: When the last message was received, of `time.monotonic`; `None` while a message is awaited.
+        self.answered_at: float | None = None
 
     @classmethod
     def dial(cls, address: str) -> Wire:
@@ -75,6 +78,7 @@ class Wire:
 
     def receive(self) -> Message:
         """Waits for one JSON message; the arrays it announces are stored under the key `arrays`."""
+        self.answered_at = None
         kind, payload = self._frame()
         if kind != _JSON:
             raise ProtocolFault("received a binary frame, expected a message")
@@ -87,6 +91,7 @@ class Wire:
         announced = message.get("binary")
         if announced is not None:
             message["arrays"] = {entry["name"]: self._array(entry) for entry in announced}
+        self.answered_at = time.monotonic()
         return message
 
     def close(self) -> None:

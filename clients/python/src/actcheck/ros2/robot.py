@@ -362,7 +362,7 @@ class RosRobot:
             else:
                 moving.append(self._transform(joint.parent, joint.child, moved(joint, positions), stamp))
         x, y, heading = seen.base
-        on_floor = Pose.upright((x, y, seen.root_height_m), heading).matrix()
+        on_floor = Pose.upright((x, y, seen.root_height_m), wrapped(heading)).matrix()
         if self._fixed:
             base = np.eye(4) if self._description.base_joints else on_floor
             still.append(self._transform("odom", self._root, base, stamp))
