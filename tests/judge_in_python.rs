@@ -173,8 +173,14 @@ pub fn package() -> Option<&'static Path> {
     static PACKAGE: OnceLock<Result<PathBuf, String>> = OnceLock::new();
     let package = PACKAGE.get_or_init(|| {
         let sources = root().join("clients/python/src/actcheck");
-        if !sources.join("_judge.abi3.so").is_file() {
-            return Err("`make judge` was not run".to_owned());
+        let written = |file: &Path| std::fs::metadata(file).and_then(|it| it.modified()).ok();
+        let program = Path::new(env!("CARGO_BIN_EXE_actcheck"));
+        match written(&sources.join("_judge.abi3.so")) {
+            None => return Err("`make judge` was not run".to_owned()),
+            Some(compiled) if Some(compiled) < written(program) => {
+                return Err("`make judge` was run before the program was built".to_owned());
+            }
+            Some(_) => {}
         }
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("package_with_judge");
         copy(&sources, &folder.join("actcheck"));

@@ -88,6 +88,7 @@ impl Process {
             .env("ACTCHECK_ADDRESS", &address)
             .env("ACTCHECK_PROTOCOL", PROTOCOL.to_string())
             .env("ACTCHECK_WORKER", worker.to_string())
+            .env("ACTCHECK_TIMEOUT_S", skill.timeout_secs.to_string())
             .current_dir(&skill.dir)
             .process_group(0)
             .stdin(Stdio::null())

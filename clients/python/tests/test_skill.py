@@ -107,7 +107,7 @@ class Serving(unittest.TestCase):
             return True
 
         cases: list[tuple[Callable[..., Any], str]] = [
-            (misspelt, r"misspelt\(\) takes `pick_object`, but Pick has `pickObject`, `surfaceObjects`$"),
+            (misspelt, r"misspelt\(\) takes `pick_object`, but Pick has `pickObject`, `surfaceObjects`; an option of your own comes after a star: `\*, pick_object=None`$"),
             (missing, r"missing\(\) takes `target`, but Pick has"),
             (lambda robot: 7, r"must return a Report, a bool or None, not int"),
             (lambda robot: robot.feels, r"not method; write `feels\(\)`"),

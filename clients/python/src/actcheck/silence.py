@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from actcheck.traces import own_frames, place_of
 from actcheck.wire import Wire
 
-#: `[skill] timeout_s` of the campaign, if actcheck does not pass it on. Unit: seconds.
-TIMEOUT_S = 10.0
+#: `[skill] timeout_s` of the campaign. Unit: seconds.
+TIMEOUT = "ACTCHECK_TIMEOUT_S"
 #: Share of the time limit after which a silent program is reported.
 SHARE = 0.9
 
@@ -25,7 +25,10 @@ def watched(wire: Wire) -> Iterator[None]:
 
     The thread sleeps for the limit at a time, so that it costs a healthy program nothing.
     """
-    limit_s = SHARE * float(os.environ.get("ACTCHECK_TIMEOUT_S", TIMEOUT_S))
+    if TIMEOUT not in os.environ:
+        yield
+        return
+    limit_s = SHARE * float(os.environ[TIMEOUT])
     thread, ended = threading.get_ident(), threading.Event()
 
     def watch() -> None:

@@ -123,7 +123,8 @@ def wanted(function: Skill, call: Call) -> dict[str, Any]:
         option = one.kind is kinds.KEYWORD_ONLY and one.default is not kinds.empty
         if name not in call.parameters and not option and one.kind not in (kinds.VAR_KEYWORD, kinds.VAR_POSITIONAL):
             has = ", ".join(f"`{designator}`" for designator in call.parameters)
-            raise Unfit(function, f"takes `{name}`, but {call.action} has {has}")
+            own = "" if one.default is kinds.empty else f"; an option of your own comes after a star: `*, {name}={one.default!r}`"
+            raise Unfit(function, f"takes `{name}`, but {call.action} has {has}{own}")
     if any(one.kind is kinds.VAR_KEYWORD for one in others):
         return dict(call.parameters)
     return {name: value for name, value in call.parameters.items() if name in taken}
