@@ -6,8 +6,7 @@
 use std::path::{Path, PathBuf};
 
 use polars::prelude::{
-    AnyValue, Column, DataFrame, DataType, KeyValueMetadata, NamedFrom as _, ParquetWriter,
-    PolarsError, Series,
+    AnyValue, Column, DataFrame, DataType, NamedFrom as _, ParquetWriter, PolarsError, Series,
 };
 use serde_json::{Value, json};
 
@@ -271,7 +270,7 @@ impl<'a> Export<'a> {
             Series::new("task_index".into(), count(&|_, frame| frame.task)),
         ];
         let path = self.folder.join("data").join(place(self.file));
-        self.write(&path, frames.len(), columns, &[])?;
+        self.write(&path, frames.len(), columns)?;
         (self.bytes, self.file) = (0, self.file + 1);
         Ok(())
     }
@@ -294,14 +293,9 @@ impl<'a> Export<'a> {
             Series::new("task".into(), &self.tasks),
         ];
         let path = meta.join("tasks.parquet");
-        self.write(
-            &path,
-            self.tasks.len(),
-            columns,
-            &[("pandas", task_as_index())],
-        )?;
+        self.write(&path, self.tasks.len(), columns)?;
         let path = meta.join("episodes").join(place(0));
-        self.write(&path, self.episodes.len(), self.episode_columns(), &[])?;
+        self.write(&path, self.episodes.len(), self.episode_columns())?;
         let below = Below::new(self.folder);
         for (name, value) in [
             ("info.json", self.info()),
@@ -350,26 +344,14 @@ impl<'a> Export<'a> {
         ]
     }
 
-    /// Writes a table, with notes about it for its readers.
-    fn write(
-        &self,
-        path: &Path,
-        height: usize,
-        columns: Vec<Series>,
-        notes: &[(&str, String)],
-    ) -> Result<(), Diagnostics> {
+    fn write(&self, path: &Path, height: usize, columns: Vec<Series>) -> Result<(), Diagnostics> {
         let write = || -> Result<(), PolarsError> {
             let columns = columns.into_iter().map(Column::from).collect();
             let mut table = DataFrame::new(height, columns)?;
             let below = Below::new(self.folder);
             below.create_folder(path.parent().unwrap_or(self.folder))?;
             let file = below.new_file(path)?;
-            let notes = notes
-                .iter()
-                .map(|(name, note)| ((*name).to_owned(), note.clone()));
-            ParquetWriter::new(file.writer()?)
-                .with_key_value_metadata(Some(KeyValueMetadata::from_static(notes.collect())))
-                .finish(&mut table)?;
+            ParquetWriter::new(file.writer()?).finish(&mut table)?;
             Ok(file.finish()?)
         };
         write().map_err(|error| unwritten(path, &error))
@@ -473,18 +455,6 @@ impl Statistics {
             .collect();
         json!({"min": self.low, "max": self.high, "mean": mean, "std": deviation, "count": [self.count]})
     }
-}
-
-/// Lets pandas take the text of a task as the index of its row: LeRobot's reader finds tasks by it.
-fn task_as_index() -> String {
-    let column = |name: &str, pandas: &str, numpy: &str| json!({"name": name, "field_name": name, "pandas_type": pandas, "numpy_type": numpy, "metadata": null});
-    json!({
-        "index_columns": ["task"],
-        "column_indexes": [],
-        "columns": [column("task_index", "int64", "int64"), column("task", "unicode", "object")],
-        "pandas_version": "2.0.0",
-    })
-    .to_string()
 }
 
 #[cfg(test)]
