@@ -110,7 +110,7 @@ fn the_list_shows_the_cause() {
         browser.value("[...document.querySelectorAll('.rows .words')].map((it) => it.textContent)");
     for words in told.as_array().unwrap().iter().filter_map(Value::as_str) {
         assert!(
-            words.starts_with("perceived ") && words.contains(" cm "),
+            words.starts_with("target perceived ") && words.contains(" cm "),
             "{words}"
         );
         assert!(words.contains("the fingers did not close on"), "{words}");
