@@ -97,9 +97,13 @@ def make(folder: Path) -> None:
 
 def _link(folder: Path) -> None:
     """Lets the environment find the same package as the one that runs now, wherever it was before."""
-    link = _site(folder) / "actcheck"
-    link.unlink(missing_ok=True)
-    link.symlink_to(HERE.parent.absolute())
+    link, package = _site(folder) / "actcheck", HERE.parent.absolute()
+    if link.is_symlink() and link.readlink() == package:
+        return
+    # A program that starts now finds one of both.
+    new = link.with_name(f"actcheck.{os.getpid()}")
+    new.symlink_to(package)
+    new.replace(link)
 
 
 def _rewrite(folder: Path) -> None:
