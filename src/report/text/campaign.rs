@@ -543,7 +543,7 @@ mod tests {
         ]);
         let text = campaign_text(&summary, Page::default());
         assert!(
-            text.contains("fails p1:\n  k7f3-1  glass_1 moved 0.4 cm, needs more than 2 cm"),
+            text.contains("fails P1:\n  k7f3-1  glass_1 moved 0.4 cm, needs more than 2 cm"),
             "{text}"
         );
         assert!(

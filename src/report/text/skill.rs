@@ -276,7 +276,11 @@ mod tests {
             },
             ..Trace::default()
         };
-        let text = skill_text(&trace, Page::default());
+        // Without the spaces that fill the last column.
+        let text: String = skill_text(&trace, Page::default())
+            .lines()
+            .map(|line| format!("{}\n", line.trim_end()))
+            .collect();
         assert_eq!(
             text,
             "\nthe program's side, at simulated seconds since the run began:
