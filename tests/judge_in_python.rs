@@ -14,6 +14,7 @@ use actcheck::history::{History, RunFilter, RunRow};
 use actcheck_judge::{Call, Judge};
 use serde_json::{Value, json};
 
+use crate::names::rust_files;
 use crate::support::{actcheck, copy, foreign, judge_values, project, root, stderr, stdout};
 
 /// Number of outcomes to compare. Without it, small campaigns are compared.
@@ -174,13 +175,15 @@ pub fn package() -> Option<&'static Path> {
     let package = PACKAGE.get_or_init(|| {
         let sources = root().join("clients/python/src/actcheck");
         let written = |file: &Path| std::fs::metadata(file).and_then(|it| it.modified()).ok();
-        let program = Path::new(env!("CARGO_BIN_EXE_actcheck"));
-        match written(&sources.join("_judge.abi3.so")) {
-            None => return Err("`make judge` was not run".to_owned()),
-            Some(compiled) if Some(compiled) < written(program) => {
-                return Err("`make judge` was run before the program was built".to_owned());
-            }
-            Some(_) => {}
+        let Some(compiled) = written(&sources.join("_judge.abi3.so")) else {
+            return Err("`make judge` was not run".to_owned());
+        };
+        let changed = rust_files(&root().join("src"))
+            .into_iter()
+            .find(|file| written(file) > Some(compiled));
+        if let Some(file) = changed {
+            let file = file.display();
+            return Err(format!("`make judge` was run before {file} was changed"));
         }
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("package_with_judge");
         copy(&sources, &folder.join("actcheck"));

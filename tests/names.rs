@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 const EXEMPT: [(&str, usize); 1] = [("remote", 1)];
 
 /// The Rust files of a folder and its subfolders, sorted.
-fn rust_files(folder: &Path) -> Vec<PathBuf> {
+pub fn rust_files(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::support::{actcheck, processes_in, root, signal, started, stderr, stdout};
+use crate::support::{actcheck, edit, processes_in, root, script, signal, started, stderr, stdout};
 
 /// A glass alone on a table.
 const SCENE: &str = "
@@ -61,6 +61,26 @@ fn runs(json: &Value) -> &[Value] {
 
 fn of<'a>(run: &'a Value, key: &str) -> &'a str {
     run[key].as_str().unwrap_or_default()
+}
+
+/// The system's words ("exec format error", "no such file" about a file that exists) name no way out.
+#[test]
+fn a_program_that_the_system_does_not_start_is_refused_with_its_cause() {
+    for (text, cause) in [
+        ("print('hello')\n", "its first line names no interpreter"),
+        (
+            "#!/usr/bin/no-such-python\n",
+            "the interpreter or loader that it names does not exist",
+        ),
+    ] {
+        let folder = project("well_behaved.py", "[[\"Pick\"]]", 1, "");
+        script(&folder.path().join("skill"), text);
+        let config = folder.path().join("c.toml");
+        edit(&config, "\"well_behaved.py\"", "\"./skill\"");
+        let (_, json, complaints) = run(folder.path(), &[]);
+        let reason = of(&runs(&json)[0], "reason");
+        assert!(reason.contains(cause), "{reason}\n{complaints}");
+    }
 }
 
 /// The output of `show` for a run.

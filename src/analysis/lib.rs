@@ -48,7 +48,7 @@ pub use dataset::{
 };
 pub use effects::{
     ActionEffects, FirstContact, LargestForce, PerceptionError, RealisedNoise, Surrounding,
-    TableRun, perceived_sentences,
+    TableRun, concerns_target, perceived_sentences,
 };
 pub use engines::{
     Disagreement, EngineComparison, OwnContact, Parting, PropertyAgreement, RunInEngines,

@@ -200,7 +200,10 @@ impl<'a> Name<'a> {
         let (dir, campaign) = match place.rsplit_once('#') {
             Some((dir, "")) => (Some(Path::new(dir)), None),
             Some((dir, campaign)) => (Some(Path::new(dir)), Some(campaign)),
-            None if Path::new(place).is_dir() => (Some(Path::new(place)), None),
+            // Ids have no `/`.
+            None if place.contains('/') || Path::new(place).is_dir() => {
+                (Some(Path::new(place)), None)
+            }
             None => (None, Some(place)),
         };
         Self {

@@ -26,9 +26,9 @@ const MOST_REPETITIONS: i64 = 1000;
 /// Reads a configuration with its models and robot. Its paths are relative to its folder.
 ///
 /// # Errors
-/// All faults at once: the file can't be read or is a program (C001), is not TOML (C002), has unknown, missing or
-/// invalid keys (C003 to C009), names missing models, robots or files (C010 to C014), or a model or
-/// robot has errors (W…).
+/// All faults at once: the file can't be read or is a program (C001), is not TOML (C002), has
+/// unknown, missing or invalid keys (C003 to C009), names missing models, robots or files (C010 to
+/// C014), or a model or robot has errors (W…).
 pub fn load(path: &Path, overrides: &Overrides) -> Result<Campaign, Diagnostics> {
     if path.extension().is_some_and(|ending| ending == "py") {
         let fault = format!("{} is a program, not a configuration", path.display());

@@ -339,13 +339,14 @@ fn find(written: &Located<String>, folder: &Path) -> Result<Command, Missing> {
 /// directory.
 fn find_file(name: &str, path: PathBuf, args: Vec<String>) -> Result<Command, Missing> {
     if !path.is_file() {
+        let fault = if path.is_dir() {
+            "is a folder"
+        } else {
+            "does not exist"
+        };
         return Err(Missing {
             code: "C031",
-            message: if path.is_dir() {
-                format!("{} is a folder", path.display())
-            } else {
-                format!("there is no file {}", path.display())
-            },
+            message: format!("{} {fault}", path.display()),
             help: "the path of `test_launcher` is relative to the configuration".to_owned(),
         });
     }

@@ -168,7 +168,6 @@ impl History {
         let known = self.stored.ids()?;
         let help = match nearest(id, known.iter().map(String::as_str)) {
             Some(found) => format!("did you mean `{found}`?"),
-            None if id.contains('/') => format!("there is no folder `{id}` with a history either"),
             None => "`actcheck list` shows all runs with their campaigns".to_owned(),
         };
         let message = format!(

@@ -143,13 +143,14 @@ impl Process {
                     if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
                 Err(error) => return Err(cannot("its connection can't be accepted", &error)),
             }
-            if let Some(how) = self.ended() {
-                // A program without a fault that ends has probably forgotten to connect.
-                let hint = if how.ends_with(" code 0") {
+            if let Some(status) = self.status() {
+                // A program that ends without a fault has probably forgotten to connect.
+                let hint = if status.success() {
                     " (in Python, `actcheck.serve()` connects)"
                 } else {
                     ""
                 };
+                let how = how(status);
                 return Err(broke(format!(
                     "{how} before it connected to the address in ACTCHECK_ADDRESS{hint}"
                 )));
@@ -173,7 +174,11 @@ impl Process {
 
     /// How the process ended, or `None` if it is running.
     pub fn ended(&mut self) -> Option<String> {
-        self.child.try_wait().ok().flatten().map(how)
+        self.status().map(how)
+    }
+
+    fn status(&mut self) -> Option<ExitStatus> {
+        self.child.try_wait().ok().flatten()
     }
 
     /// Waits briefly for a possible exit and returns how the process ended. Returns `None` if it is
@@ -379,18 +384,19 @@ fn how(status: ExitStatus) -> String {
     }
 }
 
-/// Why the system refuses to start a file that exists and may be executed: its first line.
+/// Why the program can't be started. The system's own words don't say that a file lacks the program
+/// that runs it.
 fn not_started(program: &Path, error: &std::io::Error) -> ExternalFault {
-    let line = match error.kind() {
+    let reason = match error.kind() {
         _ if error.raw_os_error() == Some(libc::ENOEXEC) => {
             "its first line names no interpreter, such as `#!/usr/bin/env python3`"
         }
         ErrorKind::NotFound if program.is_file() => {
-            "the interpreter that its first line names does not exist"
+            "the interpreter or loader that it names does not exist"
         }
         _ => return cannot("it can't be started", error),
     };
-    broke(format!("it can't be started: {line}"))
+    broke(format!("it can't be started: {reason}"))
 }
 
 fn cannot(what: &str, error: &std::io::Error) -> ExternalFault {

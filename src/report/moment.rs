@@ -115,8 +115,8 @@ fn carries(trace: &Trace, snapshot_idx: usize, id: &str, others: &[String]) -> b
 
 /// The ids that a witness names.
 struct Named {
-    /// Without the place of the object that the action handles: a sentence like "the glass still rests on the
-    /// table" names the table, but nothing that the robot did to it.
+    /// Without the place of the object that the action handles: a sentence like "the glass still
+    /// rests on the table" names the table, but nothing that the robot did to it.
     furniture: Vec<String>,
     /// Movable objects.
     things: Vec<String>,

@@ -199,11 +199,13 @@ impl Chromium {
             if found == Ok(json!(true)) {
                 return;
             }
-            assert!(
-                start.elapsed() < PATIENCE,
-                "{expression} never became true: {found:?}, {:?}",
-                self.complaints
-            );
+            if start.elapsed() >= PATIENCE {
+                let page = self.evaluated("`${location.href}\n${document.body?.innerText}`");
+                panic!(
+                    "{expression} never became true: {found:?}, {:?}\n{page:?}",
+                    self.complaints
+                );
+            }
             std::thread::sleep(PAUSE);
         }
     }

@@ -158,6 +158,13 @@ class Simulation:
         message = {"type": "begin", "action": "Pick", "parameters": values, "kinds": {}, "budget_s": 60.0}
         self.send(message | {"observation": self.observation()})
 
+    def receive_first_command(self) -> Message:
+        """Begins a run with one action, and returns its first command."""
+        self.greet()
+        self.reset()
+        self.begin()
+        return self.receive("command")
+
     def take(self, command: Message) -> None:
         """Moves the joints and the gripper by the ticks of a command."""
         self.positions |= command.get("positions", {})

@@ -55,10 +55,7 @@ class Environment(unittest.TestCase):
 
     def test_what_actcheck_ends_is_truncated(self) -> None:
         def script(simulation: Simulation) -> None:
-            simulation.greet()
-            simulation.reset()
-            simulation.begin()
-            simulation.receive("command")
+            simulation.receive_first_command()
             simulation.send({"type": "abort", "reason": "budget"})
             simulation.receive("aborted")
             simulation.bye()

@@ -203,10 +203,7 @@ class Serving(unittest.TestCase):
             raise Aborted("again")
 
         def script(simulation: Simulation) -> None:
-            simulation.greet()
-            simulation.reset()
-            simulation.begin()
-            simulation.receive("command")
+            simulation.receive_first_command()
             simulation.send({"type": "abort", "reason": "budget"})
             simulation.receive("aborted")
             simulation.reset()
@@ -217,10 +214,7 @@ class Serving(unittest.TestCase):
 
     def test_a_refusal_is_printed_with_the_line_of_the_skill(self) -> None:
         def script(simulation: Simulation) -> None:
-            simulation.greet()
-            simulation.reset()
-            simulation.begin()
-            simulation.receive("command")
+            simulation.receive_first_command()
             simulation.send({"type": "error", "reason": "its command is wrong"})
 
         with self.assertRaisesRegex(SystemExit, r"^actcheck refused a message in test_skill.py, line \d+$"):

@@ -18,6 +18,6 @@ pub use action::ActionEffects;
 pub(crate) use action::target_of;
 pub use contacts::{FirstContact, LargestForce};
 pub use noise::RealisedNoise;
-pub use perceived::{PerceptionError, perceived_sentences};
+pub use perceived::{PerceptionError, concerns_target, perceived_sentences};
 pub use surroundings::Surrounding;
 pub use table_run::TableRun;

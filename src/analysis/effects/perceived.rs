@@ -183,17 +183,14 @@ fn foot(body: &BodyState) -> [f64; 3] {
 /// target, by the action's position in the test (from 1). Left out are actions without such an
 /// error, and those whose failures are only about other objects.
 pub fn perceived_sentences(run: &RunDetail, trace: &Trace) -> BTreeMap<u32, String> {
-    let failed = run.actions.iter().filter(|action| {
-        action
-            .judgements
-            .iter()
-            .any(|judgement| judgement.outcome == Outcome::Failed)
-    });
-    failed
+    run.actions
+        .iter()
         .filter_map(|action| {
             let step = usize::try_from(action.step.checked_sub(1)?).ok()?;
             let target = &target_of(run, action)?.id;
-            if !is_about(run, action, target) {
+            let objects = || run.objects.iter().map(|object| object.id.as_str());
+            let concerns = |witness| concerns_target(witness, Some(target), objects(), mentions);
+            if !failures(action).any(concerns) {
                 return None;
             }
             let error = ActionEffects::of(run, trace, step)?.perceived?;
@@ -202,15 +199,26 @@ pub fn perceived_sentences(run: &RunDetail, trace: &Trace) -> BTreeMap<u32, Stri
         .collect()
 }
 
-/// Whether a failure of an action mentions an object, or no object at all.
-fn is_about(run: &RunDetail, action: &ActionDetail, id: &str) -> bool {
-    let objects = || run.objects.iter().map(|object| object.id.as_str());
-    action
+/// The witnesses of the failures of an action.
+fn failures(action: &ActionDetail) -> impl Iterator<Item = &str> {
+    let failed = action
         .judgements
         .iter()
-        .filter(|judgement| judgement.outcome == Outcome::Failed)
-        .map(|judgement| judgement.witness.as_str())
-        .any(|witness| mentions(witness, id) || !objects().any(|other| mentions(witness, other)))
+        .filter(|judgement| judgement.outcome == Outcome::Failed);
+    failed.map(|judgement| judgement.witness.as_str())
+}
+
+/// Whether the witness of a failure mentions the target, or no object at all: a failure that is only
+/// about other objects does not come from the perception of the target. `mentions` finds the name of
+/// an object in a text.
+pub fn concerns_target<'a>(
+    witness: &str,
+    target: Option<&str>,
+    mut objects: impl Iterator<Item = &'a str>,
+    mentions: impl Fn(&str, &str) -> bool,
+) -> bool {
+    target.is_none_or(|target| mentions(witness, target))
+        || !objects.any(|object| mentions(witness, object))
 }
 
 #[cfg(test)]

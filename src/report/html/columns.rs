@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use crate::FindingsSummary;
 use crate::html::pack::Pack;
 use crate::summary::quantity_name;
-use actcheck_analysis::{ColumnKind, OutcomeTable, PerceptionError, columns};
+use actcheck_analysis::{ColumnKind, OutcomeTable, PerceptionError, columns, concerns_target};
 use actcheck_base::{Outcome, names};
 
 /// Columns that a page needs in addition to those of the findings.
@@ -430,19 +430,20 @@ fn failed_with_target(table: &OutcomeTable) -> Vec<bool> {
     failed
 }
 
-/// Whether the witness of a row mentions the target, or no object at all. The id of an object is
-/// that of its model with a number.
+/// Whether a failure concerns the target of its action. The table has the models of the objects, and
+/// an id is that of the model with a number.
 fn is_about_target(table: &OutcomeTable, row: usize) -> bool {
-    let witness = table.text("witness").get(row).unwrap_or_default();
-    let is_mentioned = |model: &str| witness.contains(&format!("{model}_"));
-    let mut models = table
-        .text("objects")
-        .get(row)
-        .unwrap_or_default()
+    let listed = table.text("objects").get(row).unwrap_or_default();
+    let models = listed
         .split(", ")
         .filter_map(|item| item.split_once(" ("))
         .map(|(model, _)| model);
-    table.text("target_model").get(row).is_none_or(is_mentioned) || !models.any(is_mentioned)
+    concerns_target(
+        table.text("witness").get(row).unwrap_or_default(),
+        table.text("target_model").get(row),
+        models,
+        |witness, model| witness.contains(&format!("{model}_")),
+    )
 }
 
 /// The error with which the action of a row perceived its target, in words: `target perceived 5 cm

@@ -10,7 +10,7 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from actcheck.traces import own_frames, place_of
+from actcheck.tracebacks import own_frames, place_of
 from actcheck.wire import Wire
 
 #: `[skill] timeout_s` of the campaign. Unit: seconds.

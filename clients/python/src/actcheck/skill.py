@@ -17,7 +17,7 @@ from actcheck.messages import Call, Report
 from actcheck.robot import Ended, Robot
 from actcheck.session import Session
 from actcheck.silence import watched
-from actcheck.traces import place_of_definition, place_of_fault, print_traceback
+from actcheck.tracebacks import place_of_definition, place_of_fault, print_traceback
 from actcheck.wire import Wire
 
 #: A skill takes the robot and, as keyword arguments, any of the action's designators.

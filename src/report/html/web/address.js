@@ -45,6 +45,8 @@ class Address {
 
   /** Writes the state of the view into the address. A step back returns to the previous state, unless this one replaces it. */
   note(own, replace = true) {
+    // A link was followed, and its view is not drawn yet: its address stays.
+    if (addressOf(wayOf(location.hash).way) !== addressOf(this.way)) return;
     Object.assign(this.own, own);
     const query = FILTERED.has(this.way[0]) ? this.filter.query() : new URLSearchParams();
     for (const [name, value] of Object.entries(this.own)) if (value !== "" && value !== null) query.set(name, value);

@@ -102,6 +102,7 @@ def _link(folder: Path) -> None:
         return
     # A program that starts now finds one of both.
     new = link.with_name(f"actcheck.{os.getpid()}")
+    new.unlink(missing_ok=True)
     new.symlink_to(package)
     new.replace(link)
 
