@@ -149,7 +149,7 @@ fn a_new_campaign_writes_requested_parts_and_uses_them() {
     .unwrap();
     assert!(done(folder, &["check", "all.toml"]).contains("18 models"));
     std::fs::remove_file(folder.join("skills/pick.py")).unwrap();
-    assert!(refused(folder, &["check", "all.toml"]).contains("there is no file skills/pick.py"));
+    assert!(refused(folder, &["check", "all.toml"]).contains("skills/pick.py does not exist"));
 }
 
 #[test]
